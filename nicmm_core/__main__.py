@@ -16,6 +16,7 @@ from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
 from .path.via_points import parse_via_points
+from .symmetry.mirror import parse_plane
 
 AUTOMATIC = ("sharp", "curvature")
 """Maps that can be computed from the mesh alone."""
@@ -125,6 +126,12 @@ def _flag(option: Option) -> dict[str, Any]:
             "help": "vertices near which the curve runs after the I-th of the points, from 0; "
             "repeatable",
         }
+    if option.kind is Kind.PLANE:
+        return {
+            "metavar": "X|Y|Z|PLANE",
+            "help": f"{words}. An axis, for the plane through the origin at right angles to it, or "
+            "a point of the plane and its normal, such as 0,0,0,1,0,0",
+        }
     number = int if option.kind is Kind.COUNT else float
     return {"type": number, "default": option.default, "help": words}
 
@@ -136,6 +143,8 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
         return parse_via_points(value) or None
     if option.kind is Kind.WEIGHTS:
         return _automatic_map(mesh, value, given.angle)
+    if option.kind is Kind.PLANE:
+        return parse_plane(value)
     return value
 
 

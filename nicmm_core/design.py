@@ -24,6 +24,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +36,12 @@ from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
+from .geometry.surface_points import (
+    SurfacePoints,
+    check_connected,
+    locate_control_points,
+    locate_points,
+)
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
@@ -43,6 +49,14 @@ from .repair.free_surface import check_reachable, free_faces
 from .repaired_surface import Manifold, RepairedSurface, is_on, start_on
 from .request import Request, same_request
 from .status import Status
+from .symmetry.mirror import Plane
+from .symmetry.symmetric_request import (
+    ReflectedVertices,
+    reflected_vertices,
+    symmetric_weights,
+    with_images,
+    with_via_images,
+)
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that share only single vertices; a "
@@ -79,6 +93,7 @@ class Designer:
             )
         self.mesh = mesh
         self._free: _Free | None = None  # of the last request with obstacles
+        self._reflected: ReflectedVertices | None = None  # of the last one with maps and a mirror
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
 
@@ -94,6 +109,7 @@ class Designer:
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
         smoothness: float = 1.0,
+        mirror: ArrayLike | None = None,
         alternatives: int = 0,
         start: Design | SurfaceCurve | None = None,
         max_iterations: int | None = None,
@@ -134,6 +150,7 @@ class Designer:
             "obstacles": obstacles,
             "clearance": clearance,
             "alignment": alignment,
+            "mirror": mirror,
             "alternatives": alternatives,
         }
         if progress is not None and not callable(progress):
@@ -142,18 +159,14 @@ class Designer:
             with watched(progress), single_blas_thread(), self._exclusive():
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
-                points = locate_control_points(self.mesh, control_points, closed, connected=False)
-                options["via_points"] = located_via_points(
-                    self.mesh, points, options["via_points"], order, closed
-                )
-                request = Request(points=points, **options)
+                request = self._request(control_points, options)
                 manifold, there = self._on_manifold(request)
                 if isinstance(start, Design) and _answers(start, manifold, there):
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(manifold, start)
                 with placed(manifold.in_original):
                     found = manifold.designer.design(there, started, begin, max_iterations)
-                    return manifold.design_on_original(found, points)
+                    return manifold.design_on_original(found, request)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -166,6 +179,39 @@ class Designer:
             yield
         finally:
             self._lock.release()
+
+    def _request(
+        self, control_points: ArrayLike | SurfacePoints, options: dict[str, Any]
+    ) -> Request:
+        """The request for checked options, with the mirror images if it has a mirror."""
+        mesh, plane, via = self.mesh, options["mirror"], options["via_points"]
+        order, closed = options["order"], options["closed"]
+        if plane is None:
+            points = locate_control_points(mesh, control_points, closed, connected=False)
+            options["via_points"] = located_via_points(mesh, points, via, order, closed)
+            return Request(points=points, **options)
+        given = locate_points(mesh, control_points, "control_points")
+        among = self._whole.faces_connected_to(given)
+        points, mirror = with_images(mesh, given, plane, closed, order, among)
+        crosses = bool(mirror.side[len(given) - 1])  # the last leg of the half leads to the plane
+        located = located_via_points(mesh, given, via, order, crosses)
+        options["via_points"] = with_via_images(mesh, located, len(given), mirror, among)
+        options["mirror"] = mirror
+        for name in ("obstacles", "alignment"):
+            if options[name] is not None:
+                reflected = self._reflected_under(mirror.plane)
+                options[name] = symmetric_weights(mesh, options[name], reflected)
+        return Request(points=points, **options)
+
+    def _reflected_under(self, plane: Plane) -> ReflectedVertices:
+        """The mirror images of the vertices; they are kept until a request has another mirror."""
+        last = self._reflected
+        if last is None or not (
+            np.array_equal(last.plane.point, plane.point)
+            and np.array_equal(last.plane.normal, plane.normal)
+        ):
+            last = self._reflected = reflected_vertices(self.mesh, plane)
+        return last
 
     @cached_property
     def _whole(self) -> RepairedSurface:
@@ -242,6 +288,7 @@ def design_curve(
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
     smoothness: float = 1.0,
+    mirror: ArrayLike | None = None,
     alternatives: int = 0,
     progress: Progress | None = None,
 ) -> Design:
@@ -275,6 +322,16 @@ def design_curve(
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
+    mirror : (2, 3) array_like, optional
+        A point of a plane and its normal. The curve is then its own mirror image: it passes through
+        the control points, which lie on one side of the plane or on it, and then through their
+        mirror images in reverse order. It crosses the plane at right angles. A closed curve crosses
+        it twice, an open one once; the first and the last point of a closed curve, and the last
+        point of an open one, may lie on the plane. The images are the places of the mesh nearest to
+        the reflected points, and the `control_index` of the curve has them as well. A map counts on
+        both sides: each vertex has the greater of its own weight and that of its mirror image. The
+        mirror image of the leg from the i-th point has the images of ``via_points[i]``. With
+        "shortest", the order is that of a short path of the half. Only for the method "elastic".
     alternatives : int, default 0
         Largest number of further curves, along other courses, to return in `Design.alternatives`.
         Only with the method "elastic".
@@ -295,7 +352,7 @@ def design_curve(
         If no simple curve through the points exists on the surface, if every path found winds
         around itself too often, or if obstacles of weight 1 separate the points.
     ArgumentError
-        If another argument cannot be used.
+        If another argument cannot be used, or the mesh is not symmetric enough about the mirror.
 
     Examples
     --------
@@ -316,6 +373,7 @@ def design_curve(
         alignment=alignment,
         clearance=clearance,
         smoothness=smoothness,
+        mirror=mirror,
         alternatives=alternatives,
         progress=progress,
     )

@@ -25,6 +25,7 @@ class Kind(Enum):
     LENGTH = "a length in mesh units"
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
+    PLANE = "a point of a plane and its normal, or None"
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,14 @@ OPTIONS: tuple[Option, ...] = (
         None,
         "Alignment",
         "Weights that attract the curve",
+    ),
+    Option(
+        "mirror",
+        Kind.PLANE,
+        None,
+        "Mirror",
+        "Plane in which the curve is its own mirror image; the control points lie on one side",
+        elastic_only=True,
     ),
     Option(
         "alternatives",

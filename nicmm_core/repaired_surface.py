@@ -35,6 +35,7 @@ from .repair.nonmanifold import manifold
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
+from .symmetry.reflection import asymmetry
 
 LARGEST_COPY = 200_000
 """Number of faces of a connected mesh above which curves are designed on the mesh itself.
@@ -82,6 +83,8 @@ class Manifold:
         """Map a request from the given mesh to the mesh of the designer."""
         for copy in self.copies:
             request = mapped_request(request, copy.points_to, copy.weights_to)
+            if request.mirror is not None:
+                request = replace(request, mirror=request.mirror.mapped(copy.from_original))
         return request
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
@@ -108,8 +111,8 @@ class Manifold:
             curve = mapped
         return curve
 
-    def design_on_original(self, design: Design, points: SurfacePoints) -> Design:
-        """Map a design to the given mesh, on which its control points are given.
+    def design_on_original(self, design: Design, request: Request) -> Design:
+        """Map a design to the given mesh, on which it is requested.
 
         It continues only on a mesh that equals the given one.
         """
@@ -118,11 +121,13 @@ class Manifold:
             curves = [copy.curve_back(curve) for curve in curves]
         if self.repaired.differs:
             removed = self.repaired.clean.removed_faces
-            curves = [removed.led_across(curve, points) for curve in curves]
+            curves = [removed.led_across(curve, request.points) for curve in curves]
+        mirror = request.mirror
         return replace(
             design,
             curves=curves,
-            alternatives=[self.design_on_original(other, points) for other in design.alternatives],
+            alternatives=[self.design_on_original(other, request) for other in design.alternatives],
+            asymmetry=None if mirror is None else asymmetry(curves[0], mirror.plane),
             find_field=partial(_field_back, self.copies, design),
             resumable=resumable and replace(resumable, given=self.repaired.original),
             repairs=dict(self.repaired.repairs),
@@ -165,6 +170,22 @@ class RepairedSurface:
             made = self._manifold(clean, connected)
             if made is not None:
                 yield made
+
+    def faces_connected_to(self, points: SurfacePoints) -> IntArray | None:
+        """Faces of the given mesh on the component that contains points.
+
+        None if these are all faces, or if there is no such component.
+        """
+        made = next(self.manifolds(), None)
+        component = None if made is None else made.common_component(points)
+        if made is None or component is None:
+            return None
+        label = made.mesh.face_component[made.in_mesh.parent]
+        return (
+            None
+            if (label == component).all()
+            else np.unique(made.in_given.parent[label == component])
+        )
 
     @property
     def most_connected(self) -> MappedMesh:

@@ -72,10 +72,13 @@ WITHOUT_MODIFIERS = ", use_modifiers=False"
 NEW_CURVE_OPTIONS = ("order", "alternatives")
 """Options that matter only once, since control points are stored in the order visited."""
 
+SCRIPTED_KINDS = (Kind.POINTS, Kind.PLANE)
+"""Kinds of options that have no property in Blender."""
+
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind is not Kind.POINTS and option.name not in NEW_CURVE_OPTIONS
+    if option.kind not in SCRIPTED_KINDS and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 
