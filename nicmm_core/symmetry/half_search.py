@@ -183,7 +183,7 @@ def _on_whole(half: HalfMesh, copy: Renumbered, curve: DiscreteCurve, controls: 
     trimmed = 2.0 * TRIMMED * arc[-1]
     kept = (arc > trimmed) | (controls[0] >= 0)
     kept &= (arc < arc[-1] - trimmed) | (controls[-1] >= 0)
-    first, *_, last = np.flatnonzero(kept | (control >= 0))
+    first, *_, last = np.flatnonzero((kept & is_node) | (control >= 0))
     kept = slice(first, last + 1)
     left_out = short_segments(copy.mesh, curve)[kept]
     left_out[[0, -1]] = False

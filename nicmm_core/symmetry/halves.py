@@ -101,17 +101,17 @@ def half_of(
     inner = (index[0] + np.arange((index[-1] - index[0]) % n + 1)) % n
     if (heights[np.setdiff1d(inner, index)] < -on_plane).any():
         return None
+    control, is_node = np.full(n, -1), np.zeros(n, dtype=bool)
+    control[index], is_node[curve.node_index] = visited[run], True
+    trimmed = TRIMMED * curve.length
     back = onward = inner[:0]
     if sides[run[0]] and (curve.closed or run[0] > 0):
         way = (index[0] - np.arange(n if curve.closed else index[0] + 1)) % n
-        back = _until_plane(positions[way], heights[way], on_plane, curve.length)[::-1]
-        back = way[back]
+        back = way[_until_plane(positions[way], heights[way], is_node[way], on_plane, trimmed)]
     if sides[run[-1]] and (curve.closed or run[-1] < len(visited) - 1):
         way = (index[-1] + np.arange(n if curve.closed else n - index[-1])) % n
-        onward = way[_until_plane(positions[way], heights[way], on_plane, curve.length)]
-    every = np.concatenate([back, inner, onward])
-    control, is_node = np.full(n, -1), np.zeros(n, dtype=bool)
-    control[index], is_node[curve.node_index] = visited[run], True
+        onward = way[_until_plane(positions[way], heights[way], is_node[way], on_plane, trimmed)]
+    every = np.concatenate([back[::-1], inner, onward])
     left_out = short_segments(surface.mesh, curve)[every]
     left_out[[0, -1]] = False
     return Half(curve.polyline[every], control[every], is_node[every], left_out)
@@ -134,11 +134,11 @@ def _run_on_side(sides: IntArray, closed: bool, side: int) -> IntArray | None:
 
 
 def _until_plane(
-    positions: FloatArray, heights: FloatArray, on_plane: float, length: float
+    positions: FloatArray, heights: FloatArray, is_node: BoolArray, on_plane: float, trimmed: float
 ) -> IntArray:
     """Indices of the points of a way before it reaches the plane, without its first point.
 
-    Those within the length `TRIMMED` of the plane are left out.
+    The last of them is a node, since a trace from a point on an edge may begin in the wrong face.
 
     Parameters
     ----------
@@ -146,17 +146,19 @@ def _until_plane(
         Points of the way from a control point.
     heights : (p,) float array
         Their distances from the plane.
+    is_node : (p,) bool array
     on_plane : float
         Greatest distance of a point on the plane.
-    length : float
-        Length of the whole curve.
+    trimmed : float
+        Length next to the plane within which points are left out, but at most half of the way.
     """
     reached = int((heights <= on_plane).argmax())
     steps = np.linalg.norm(np.diff(positions[: reached + 1], axis=0), axis=1)
     high, low = heights[reached - 1], heights[reached]
     steps[-1] *= high / max(high - low, high)  # up to the plane
     left = np.cumsum(steps[::-1])[::-1]
-    return 1 + np.flatnonzero(left[1:] > TRIMMED * length)
+    kept = np.flatnonzero(is_node[:reached] & (left > min(trimmed, 0.5 * left[0])))
+    return np.arange(1, kept[-1] + 1)
 
 
 def with_image(
