@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 from .arguments import check_iterations, checked_options
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design
-from .errors import ArgumentError, UnreachableError
+from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
@@ -41,16 +41,28 @@ from .geometry.surface_points import (
     check_connected,
     locate_control_points,
     locate_points,
+    nearest_points,
+    snapped,
 )
+from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
-from .repaired_surface import Manifold, RepairedSurface, is_on, start_on
+from .repaired_surface import (
+    Manifold,
+    RepairedSurface,
+    curve_of_design,
+    is_on,
+    only_curve,
+    start_on,
+)
 from .request import Request, same_request
 from .status import Status
-from .symmetry.mirror import Plane
+from .symmetry.mirror import Plane, checked_plane
+from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
+    FARTHEST_IMAGE,
     ReflectedVertices,
     reflected_vertices,
     symmetric_weights,
@@ -169,6 +181,39 @@ class Designer:
                     return manifold.design_on_original(found, request)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
+
+    def mirrored(self, design: Design, plane: ArrayLike) -> Design:
+        """The mirror image of a design; see the function `mirrored`."""
+        started = time.perf_counter()
+        if not isinstance(design, Design):
+            raise ArgumentError(f"design is a {type(design).__name__}; pass a Design")
+        checked = checked_plane("plane", plane, self.mesh)
+        curve, _ = curve_of_design(self.mesh, only_curve(design, "design"), "design")
+        positions = checked.reflected(curve.points)
+        with self._exclusive():
+            images, distance = nearest_points(self.mesh, positions)
+            if (distance > FARTHEST_IMAGE * self.mesh.diagonal).any():
+                raise CurveError(
+                    f"the mirror image of design is up to {distance.max():.3g} away from the "
+                    f"surface, more than {FARTHEST_IMAGE:.0%} of the mesh's diagonal; pass another "
+                    "plane"
+                )
+            unpainted = checked_options(
+                self.mesh, {option.name: option.default for option in OPTIONS}
+            )
+            unpainted |= {"closed": curve.closed, "via_points": {}}
+            request = Request(points=snapped(images[curve.control_index]), **unpainted)
+            manifold, there = self._on_manifold(request)
+            found = mirrored_design(
+                manifold.designer.surface,
+                there,
+                manifold.from_original(positions),
+                (curve.barycentric == 0.0).any(axis=1),
+                curve,
+                design.status,
+            )
+            result = manifold.design_on_original(found, request)
+        return replace(result, seconds=time.perf_counter() - started)
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:
@@ -377,3 +422,46 @@ def design_curve(
         alternatives=alternatives,
         progress=progress,
     )
+
+
+def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
+    """The mirror image of a design, as a design on the same mesh.
+
+    Every point of the curve is moved to the place of the mesh nearest to its mirror image, and
+    consecutive places are joined by straight traces. The result is not relaxed; another design with
+    ``start=`` continues from it. `Designer.mirrored` does the same.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh of the design.
+    design : Design
+        A design with one curve.
+    plane : (2, 3) array_like
+        A point of the plane and its normal.
+
+    Returns
+    -------
+    Design
+        A design through the mirror images of the control points, in the same order, with the status
+        of the given one. Its energy has no term of maps.
+
+    Raises
+    ------
+    CurveError
+        If the design has not exactly one curve on this mesh, or its mirror image is too far from
+        the surface, or cannot be traced on it without crossing itself.
+    ArgumentError
+        If another argument cannot be used.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(3)
+    >>> left = nicmm.design_curve(mesh, [12, 80, 41], order="shortest")
+    >>> right = nicmm.mirrored(mesh, left, ((0, 0, 0), (1, 0, 0)))
+    >>> len(right.curves)
+    1
+    """
+    return Designer(mesh).mirrored(design, plane)

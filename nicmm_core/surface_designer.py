@@ -18,6 +18,7 @@ from .geometry.curve import SurfaceCurve
 from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
+from .mapped_surface import MappedSurface
 from .progress import CancelledError, checkpoint, subrange
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
@@ -60,6 +61,11 @@ class SurfaceDesigner:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._search = StartSearch(mesh)
+
+    @property
+    def surface(self) -> MappedSurface:
+        """The surface of the mesh."""
+        return self._search.surface
 
     def design(
         self,

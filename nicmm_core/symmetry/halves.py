@@ -20,7 +20,7 @@ from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.discrete_curve import DiscreteCurve, short_segments, without_points
 from ..request import Request
 from .mirror import ON_PLANE, Mirror
-from .reflection import joined_places, reflected_places
+from .reflection import joined_places, reflected_places, with_controls
 
 TRIMMED = 1.0 / 1024.0
 """Length of curve next to the plane that is replaced by a trace, relative to the whole length.
@@ -172,9 +172,9 @@ def with_image(
     mirror = mirror_of(request)
     control = half.control
     image = np.where(control < 0, -1, mirror.image[control])
-    own = _with_controls(half.points, control, request.points)
+    own = with_controls(half.points, control, request.points)
     reflected = reflected_places(surface.mesh, mirror.plane, half.points)
-    reflected = _with_controls(reflected, image, request.points)
+    reflected = with_controls(reflected, image, request.points)
     backward = np.flatnonzero((control < 0) | (control != image))[::-1]
     parts = [np.arange(len(control)), len(control) + backward]
     if (mirror.side[control[control >= 0]] < 0).any():
@@ -198,17 +198,6 @@ def with_image(
     left_out = np.zeros(len(polyline), dtype=bool)
     left_out[number[np.tile(half.left_out, 2)[order]]] = True
     return curve, without_points(surface.mesh, curve, left_out), point[point >= 0]
-
-
-def _with_controls(
-    places: SurfacePoints, control: IntArray, points: SurfacePoints
-) -> SurfacePoints:
-    """Places, of which those with the index of a control point are replaced by that point."""
-    faces, barycentric = places.faces.copy(), places.barycentric.copy()
-    which = control >= 0
-    faces[which] = points.faces[control[which]]
-    barycentric[which] = points.barycentric[control[which]]
-    return SurfacePoints(faces, barycentric)
 
 
 def mirror_of(request: Request) -> Mirror:

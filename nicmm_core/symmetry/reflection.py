@@ -10,7 +10,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, shared_faces
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points
@@ -28,12 +28,45 @@ Coordinates of canonical copies are rounded, so the images of edges are edges on
 
 def reflected_places(mesh: Mesh, plane: Plane, points: SurfacePoints) -> SurfacePoints:
     """The places of a mesh nearest to the reflected positions of points on it."""
-    places, _ = nearest_points(mesh, plane.reflected(points.positions(mesh)))
-    on_edge = (points.barycentric == 0.0).any(axis=1)[:, None]
+    on_edge = (points.barycentric == 0.0).any(axis=1)
+    return nearest_places(mesh, plane.reflected(points.positions(mesh)), on_edge)
+
+
+def nearest_places(mesh: Mesh, positions: FloatArray, on_edge: BoolArray) -> SurfacePoints:
+    """The places of a mesh nearest to the images of points.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    positions : (n, 3) float array
+        The images of the points.
+    on_edge : (n,) bool array
+        Which points are on edges. The places of the others are strictly inside faces.
+    """
+    places, _ = nearest_points(mesh, positions)
     barycentric = places.barycentric
     at_edges = np.where(barycentric < ON_EDGE, 0.0, barycentric)
     at_edges /= at_edges.sum(axis=1, keepdims=True)
-    return SurfacePoints(places.faces, np.where(on_edge, at_edges, strictly_inside(barycentric)))
+    inside = strictly_inside(barycentric)
+    return SurfacePoints(places.faces, np.where(on_edge[:, None], at_edges, inside))
+
+
+def with_controls(places: SurfacePoints, control: IntArray, points: SurfacePoints) -> SurfacePoints:
+    """Places, of which those with the index of a control point are replaced by that point.
+
+    Parameters
+    ----------
+    places : SurfacePoints
+    control : (n,) int array
+        Index of the control point of each place; -1 for the others.
+    points : SurfacePoints
+        Control points.
+    """
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    which = control >= 0
+    faces[which] = points.faces[control[which]]
+    barycentric[which] = points.barycentric[control[which]]
+    return SurfacePoints(faces, barycentric)
 
 
 def joined_places(
