@@ -13,7 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..nicmm_core.options import OF_POINTS, OPTIONS, Kind, Option
+from ..nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
 from .scene import curve_record
 
@@ -36,11 +36,11 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, without those of single points."""
+    """Blender properties for core options, without those of compound kinds."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
-        if option.kind not in OF_POINTS
+        if option.kind not in COMPOUND_KINDS
     }
 
 

@@ -16,6 +16,7 @@ from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
 from .path.via_points import parse_via_points
+from .symmetry.mirror import parse_plane
 
 AUTOMATIC = ("sharp", "curvature")
 """Maps that can be computed from the mesh alone."""
@@ -123,6 +124,12 @@ def _flag(option: Option) -> dict[str, Any]:
         }
     if option.kind is Kind.INDICES:
         return {"metavar": "I,J", "help": f"{words}, by their places in --points, from 0"}
+    if option.kind is Kind.PLANE:
+        return {
+            "metavar": "X|Y|Z|PLANE",
+            "help": f"{words}. An axis, for the plane through the origin at right angles to it, or "
+            "a point of the plane and its normal, such as 0,0,0,1,0,0",
+        }
     number = int if option.kind is Kind.COUNT else float
     return {"type": number, "default": option.default, "help": words}
 
@@ -137,6 +144,8 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
         return None if value is None else _indices(option.name, value, what, "0,2")
     if option.kind is Kind.WEIGHTS:
         return _automatic_map(mesh, value, given.angle)
+    if option.kind is Kind.PLANE:
+        return parse_plane(value)
     return value
 
 

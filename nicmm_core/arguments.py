@@ -16,6 +16,7 @@ from .errors import ArgumentError
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.mesh import Mesh, real_array
 from .options import Kind, Option
+from .symmetry.mirror import checked_plane
 
 
 def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -68,6 +69,8 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
         return number_between(name, value, *option.limits, what)
     if option.kind is Kind.COUNT:
         return _checked_count(option, value)
+    if option.kind is Kind.PLANE:
+        return None if value is None else checked_plane(name, value, mesh)
     return value
 
 

@@ -26,10 +26,11 @@ class Kind(Enum):
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
     INDICES = "indices of control points, or None"
+    PLANE = "a point of a plane and its normal, or None"
 
 
-OF_POINTS = (Kind.POINTS, Kind.INDICES)
-"""Kinds of options that refer to single control points."""
+COMPOUND_KINDS = (Kind.POINTS, Kind.INDICES, Kind.PLANE)
+"""Kinds of values that have several parts, and so no single field in a user interface."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +185,14 @@ OPTIONS: tuple[Option, ...] = (
         None,
         "Alignment",
         "Weights that attract the curve",
+    ),
+    Option(
+        "mirror",
+        Kind.PLANE,
+        None,
+        "Mirror",
+        "Plane in which the curve is its own mirror image; the control points lie on one side",
+        elastic_only=True,
     ),
     Option(
         "alternatives",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from .geometry.array_types import BoolArray, FloatArray, IntArray
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
+from .symmetry.mirror import Mirror
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Request:
     Attributes
     ----------
     points : SurfacePoints
-        Control points.
+        Control points; with a mirror, those that the caller has given, and then their images.
     closed : bool
     order : {"given", "shortest"}
     via_points : dict
@@ -35,6 +36,8 @@ class Request:
     clearance : float
         Least distance from obstacles of weight 1, in mesh units.
     alignment : (V,) float array or None
+    mirror : Mirror or None
+        The plane of a symmetric curve.
     alternatives : int
         Largest number of further curves along other courses.
     """
@@ -50,6 +53,7 @@ class Request:
     obstacles: FloatArray | None
     clearance: float
     alignment: FloatArray | None
+    mirror: Mirror | None
     alternatives: int
 
     @property
@@ -65,7 +69,11 @@ class Request:
     def named_points(self) -> dict[str, SurfacePoints]:
         """Control points and via points, by the argument that contains them."""
         via = {f"via_points[{key}]": points for key, points in self.via_points.items()}
-        return {"control_points": self.points, **via}
+        if self.mirror is None:
+            return {"control_points": self.points, **via}
+        count = int((self.mirror.side >= 0).sum())
+        images = {"mirror images of control_points": self.points[count:]}
+        return {"control_points": self.points[:count], **images, **via}
 
 
 def mapped_request(
@@ -85,9 +93,7 @@ def mapped_request(
 
 def same_request(one: Request, other: Request) -> bool:
     """Whether two requests are equal in every field."""
-    return all(
-        _same(getattr(one, field.name), getattr(other, field.name)) for field in fields(Request)
-    )
+    return _same(one, other)
 
 
 def same_maps(one: Request, other: Request) -> bool:
@@ -96,8 +102,10 @@ def same_maps(one: Request, other: Request) -> bool:
 
 
 def _same(one: Any, other: Any) -> bool:
-    if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
-        return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)
+    if is_dataclass(one) and type(one) is type(other):
+        return all(
+            _same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one)
+        )
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, dict):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import bpy
 import numpy as np
 
-from ...nicmm_core.options import OF_POINTS, OPTIONS, Kind
+from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
 from . import mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .lookup import is_in
@@ -76,7 +76,7 @@ NEW_CURVE_OPTIONS = ("order", "alternatives")
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind not in OF_POINTS and option.name not in NEW_CURVE_OPTIONS
+    if option.kind not in COMPOUND_KINDS and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 

@@ -116,6 +116,11 @@ def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
 
     The neighbours of a node strictly inside a face can be joined within this face.
     """
+    return without_points(mesh, curve, short_segments(mesh, curve))
+
+
+def short_segments(mesh: Mesh, curve: DiscreteCurve) -> BoolArray:
+    """Which points of the polyline are nodes at short segments; no two consecutive ones."""
     polyline = curve.polyline
     inside = np.zeros(len(polyline), dtype=bool)
     inside[np.delete(curve.node_index, curve.control_nodes)] = True
@@ -124,7 +129,13 @@ def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
     positions = polyline.positions(mesh)
     length = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     short = length < SHORT * float(curve.nodes.lengths.mean())
-    kept = ~(inside & (short | np.roll(short, 1)))
+    near_edges: BoolArray = inside & (short | np.roll(short, 1))
+    return near_edges
+
+
+def without_points(mesh: Mesh, curve: DiscreteCurve, left_out: BoolArray) -> SurfaceCurve:
+    """The polyline without some nodes, if it stays simple; otherwise the whole polyline."""
+    polyline, kept = curve.polyline, ~left_out
     if kept.all() or len(crossing_segments(mesh.faces, polyline[kept], curve.closed)):
         return curve.surface_curve(mesh)
     at_controls = (np.cumsum(kept) - 1)[curve.node_index[curve.control_nodes]]
