@@ -39,6 +39,7 @@ from .geometry.mesh import Mesh
 from .geometry.surface_points import (
     SurfacePoints,
     check_connected,
+    check_count,
     locate_control_points,
     locate_points,
     nearest_points,
@@ -208,7 +209,6 @@ class Designer:
                 manifold.designer.surface,
                 there,
                 manifold.from_original(positions),
-                (curve.barycentric == 0.0).any(axis=1),
                 curve,
                 design.status,
             )
@@ -236,6 +236,8 @@ class Designer:
             options["via_points"] = located_via_points(mesh, points, via, order, closed)
             return Request(points=points, **options)
         given = locate_points(mesh, control_points, "control_points")
+        if not len(given):
+            check_count(0, closed)
         among = self._whole.faces_connected_to(given)
         points, mirror = with_images(mesh, given, plane, closed, order, among)
         crosses = bool(mirror.side[len(given) - 1])  # the last leg of the half leads to the plane
