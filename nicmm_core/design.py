@@ -36,6 +36,7 @@ from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
+from .geometry.mirror import Plane, checked_plane
 from .geometry.surface_points import (
     SurfacePoints,
     check_connected,
@@ -60,7 +61,6 @@ from .repaired_surface import (
 )
 from .request import Request, same_request
 from .status import Status
-from .symmetry.mirror import Plane, checked_plane
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,

@@ -13,11 +13,11 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, shared_faces
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import Plane
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points
 from ..geometry.tracing import fold_margin, strictly_inside, trace_between
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.node_traces import DETOUR
-from .mirror import Plane
 
 ON_EDGE = 1e-5
 """Barycentric coordinate below which the image of a point on an edge is on an edge as well.

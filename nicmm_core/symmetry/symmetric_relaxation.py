@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from ..courses.comparison import distinct_by_energy, is_apart
 from ..geometry.curve import SurfaceCurve
 from ..improvement import KINKED, relaxation_config
+from ..progress import CancelledError
 from ..relaxation.curve_energies import energies_of, scaled_bending
 from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.elastic_energy import bending_energy, feature_energy
@@ -110,6 +111,7 @@ def relaxed_symmetric(
     scale : float
         Length scale of the energies.
     relax : callable
+        Relaxes a start with some settings; raises `CancelledError` if the caller stops it.
     config : RelaxationConfig
         Settings of the first round; the limit on iterations is that of all rounds together.
 
@@ -121,6 +123,11 @@ def relaxed_symmetric(
         This curve.
 
     None if no symmetric curve was found.
+
+    Raises
+    ------
+    CancelledError
+        If the caller has stopped it before there was a symmetric curve.
     """
     iterations, work, status = 0, 0.0, Status.ITERATION_LIMIT
     collided, is_short = False, False
@@ -130,17 +137,19 @@ def relaxed_symmetric(
             break
         limit = min(left, SHORT_ROUND) if is_short else left
         settings = config if number == 0 else replace(WARM, defer_tracing=config.defer_tracing)
-        last = relax(start, replace(settings, most_iterations=limit))
+        try:
+            last = relax(start, replace(settings, most_iterations=limit))
+            found = _best_from(request, start, last, scale)
+        except CancelledError:
+            if best is None:
+                raise
+            status = Status.CANCELLED
+            break
         iterations, work = iterations + last.iterations, work + last.work
         collided = collided or last.collided
-        if last.status in (Status.CANCELLED, Status.UNRELAXED):
-            status = last.status
+        if last.status is Status.UNRELAXED:
+            status = Status.UNRELAXED
             break
-        found = min(
-            symmetric_from(request, start, last.discrete_curve),
-            key=lambda each: each.energy(request, scale),
-            default=None,
-        )
         energy = math.inf if found is None else found.energy(request, scale)
         before = math.inf if best is None else best.energy(request, scale)
         if found is not None and energy < before:
@@ -154,7 +163,8 @@ def relaxed_symmetric(
         elif not is_short and limit > SHORT_ROUND:
             is_short = True
             continue
-        status = Status.CONVERGED
+        if last.status is Status.CONVERGED or is_short:
+            status = Status.CONVERGED
         break
     if best is None:
         return None
@@ -164,12 +174,20 @@ def relaxed_symmetric(
     return best.start, relaxed
 
 
+def _best_from(
+    request: Request, start: InitialCurve, last: Relaxed, scale: float
+) -> SymmetricCurve | None:
+    """The symmetric curve of least energy made of a relaxed curve, or None."""
+    curves = symmetric_from(request, start, last.discrete_curve)
+    return min(curves, key=lambda each: each.energy(request, scale), default=None)
+
+
 def best_symmetric(
     request: Request,
     begins: list[SymmetricCurve],
     relax: Relax,
     most_iterations: int | None,
-) -> list[tuple[InitialCurve, Relaxed]]:
+) -> tuple[list[tuple[InitialCurve, Relaxed]], bool]:
     """Relax the best of some symmetric curves.
 
     Parameters
@@ -184,6 +202,8 @@ def best_symmetric(
     -------
     list of (InitialCurve, Relaxed)
         Distinct symmetric curves by ascending energy.
+    bool
+        Whether the caller has stopped it.
     """
     starts: list[InitialCurve] = []
     relaxed: list[Relaxed] = []
@@ -214,4 +234,5 @@ def best_symmetric(
             break
     curves = [each.discrete_curve for each in relaxed]
     order = distinct_by_energy(starts[0].surface, curves, energies)
-    return [(starts[i], relaxed[i]) for i in order]
+    cancelled = relaxed[-1].status is Status.CANCELLED
+    return [(starts[i], relaxed[i]) for i in order], cancelled

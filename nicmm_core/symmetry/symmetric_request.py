@@ -10,6 +10,7 @@ from ..errors import ArgumentError, ControlPointError, PointName
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import ON_PLANE, Mirror, Plane
 from ..geometry.surface_points import (
     SurfacePoints,
     check_count,
@@ -20,7 +21,6 @@ from ..geometry.surface_points import (
     snapped,
 )
 from ..path.via_points import LocatedViaPoints
-from .mirror import ON_PLANE, Mirror, Plane
 
 FARTHEST_IMAGE = 0.05
 """Greatest distance of the mirror image of a point from the surface, in bounding-box diagonals."""

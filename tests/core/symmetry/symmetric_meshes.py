@@ -6,8 +6,8 @@ from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.mirror import Plane
 from nicmm_core.symmetry.half_mesh import half_mesh
-from nicmm_core.symmetry.mirror import Plane
 
 MIRROR = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 FLIP = np.array([-1.0, 1.0, 1.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
+from nicmm_core import progress, shapes
 from nicmm_core.__main__ import main
 from nicmm_core.io.files import read_mesh, write_mesh
 from tests.core.checks import assert_valid_curve, circle, flipped, joined, renumbered
@@ -336,11 +336,26 @@ class TestStart:
         assert design.status is nicmm.Status.ITERATION_LIMIT
         assert design.asymmetry <= SYMMETRIC * creature.diagonal
 
-    def test_cancelled(self, creature, designer):
+    @pytest.mark.slow
+    def test_cancelled_at_any_checkpoint(self, creature, monkeypatch):
+        """There is no curve before one is symmetric, and only symmetric ones afterwards."""
+        monkeypatch.setattr(progress, "INTERVAL", 0.0)
         points = points_on_right(creature, 3, 4)
-        design = designer.design(points, mirror=MIRROR, progress=lambda *_: False)
-        assert design.status is nicmm.Status.CANCELLED
-        assert not design.curves
+        designer = nicmm.Designer(creature)
+        calls = []
+        designer.design(points, mirror=MIRROR, progress=lambda *_: calls.append(0) or True)
+        found = []
+        for last in (0, len(calls) // 2, *range(len(calls) - 40, len(calls) - 1, 3)):
+            left = iter(range(last))
+            design = designer.design(
+                points, mirror=MIRROR, progress=lambda *_, left=left: next(left, None) is not None
+            )
+            assert design.status is nicmm.Status.CANCELLED
+            found += design.curves
+            for curve in design.curves:
+                assert design.asymmetry <= SYMMETRIC * creature.diagonal
+                assert_valid_curve(creature, curve, curve.points[curve.control_index])
+        assert found
 
 
 class TestErrors:

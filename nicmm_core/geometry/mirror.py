@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError
-from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.mesh import Mesh, real_array
+from .array_types import FloatArray, IntArray
+from .mesh import Mesh, real_array
 
 ON_PLANE = 1e-6
 """Distance from the plane, in bounding-box diagonals, up to which a control point is on it."""
