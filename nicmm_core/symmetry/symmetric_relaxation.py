@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from ..courses.comparison import distinct_by_energy, is_apart
 from ..geometry.curve import SurfaceCurve
+from ..geometry.surface_points import nearest_points
 from ..improvement import KINKED, relaxation_config
 from ..progress import CancelledError
 from ..relaxation.curve_energies import energies_of, scaled_bending
@@ -23,7 +24,9 @@ from ..relaxation.warm_start import WARM
 from ..request import Request
 from ..start_search import InitialCurve
 from ..status import Status
-from .halves import symmetric_curves
+from .halves import mirror_of, symmetric_curves
+from .reflection import asymmetry
+from .symmetric_request import FARTHEST_IMAGE
 
 MOST_ROUNDS = 6
 """Greatest number of times that a symmetric curve is relaxed."""
@@ -36,6 +39,14 @@ A symmetric curve may be a saddle point of the energy of all curves.
 
 SAME_ENERGY = 0.1
 """Difference of energies that is neglected; that of a plane circle is 8π², about 80."""
+
+ROUGH = 2.0
+"""Energy of a symmetric curve above that of a relaxed one from which the relaxed one is taken, if
+the surface is not symmetric."""
+
+SYMMETRIC_SURFACE = 1e-5
+"""Distance of mirror images from the surface, in bounding-box diagonals, up to which the surface
+counts as symmetric."""
 
 MOST_CANDIDATES = 4
 """Greatest number of relaxed curves that are made symmetric, besides those for alternatives."""
@@ -131,6 +142,7 @@ def relaxed_symmetric(
     """
     iterations, work, status = 0, 0.0, Status.ITERATION_LIMIT
     collided, is_short = False, False
+    fair: tuple[float, InitialCurve, Relaxed] | None = None
     for number in range(MOST_ROUNDS):
         left = config.most_iterations - iterations
         if left <= 0:
@@ -150,12 +162,14 @@ def relaxed_symmetric(
         if last.status is Status.UNRELAXED:
             status = Status.UNRELAXED
             break
+        (reached,) = energies_of(start.surface, [last.discrete_curve], request.smoothness, scale)
+        if fair is None or reached < fair[0]:
+            fair = reached, start, last
         energy = math.inf if found is None else found.energy(request, scale)
         before = math.inf if best is None else best.energy(request, scale)
         if found is not None and energy < before:
             best, start = found, found.start
-            reached = energies_of(start.surface, [last.discrete_curve], request.smoothness, scale)
-            is_settled = last.status is Status.CONVERGED and energy <= reached[0] + SAME_ENERGY
+            is_settled = last.status is Status.CONVERGED and energy <= reached + SAME_ENERGY
             if not is_settled and energy < before - SAME_ENERGY:
                 continue
         elif best is None:
@@ -168,10 +182,30 @@ def relaxed_symmetric(
         break
     if best is None:
         return None
+    if fair is not None and _is_rough(request, best, fair[2], fair[0], scale):
+        return fair[1], replace(fair[2], iterations=iterations, work=work, collided=collided)
     curve = best.nodes
     bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
     relaxed = Relaxed(best.curve, curve, bending, feature, iterations, status, work, collided)
     return best.start, relaxed
+
+
+def _is_rough(
+    request: Request, symmetric: SymmetricCurve, fair: Relaxed, energy: float, scale: float
+) -> bool:
+    """Whether the surface is not symmetric enough for a fair symmetric curve.
+
+    Where it is only nearly symmetric, mirror images of points are on the surface only after they
+    are moved there, which bends the image of the curve. The curve `fair`, with its energy, has been
+    relaxed from a symmetric one and not made symmetric again.
+    """
+    if symmetric.energy(request, scale) <= energy + ROUGH:
+        return False
+    mesh, plane = symmetric.start.surface.mesh, mirror_of(request).plane
+    images = plane.reflected(symmetric.nodes.nodes.positions)
+    if nearest_points(mesh, images)[1].max() <= SYMMETRIC_SURFACE * mesh.diagonal:
+        return False
+    return asymmetry(fair.curve, plane) <= FARTHEST_IMAGE * mesh.diagonal
 
 
 def _best_from(

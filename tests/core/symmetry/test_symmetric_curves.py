@@ -120,6 +120,11 @@ def creature():
     return mesh
 
 
+@pytest.fixture(scope="module")
+def designer(creature):
+    return nicmm.Designer(creature)
+
+
 class TestTheOtherSide:
     """What is on the other side of the plane is found from the given side."""
 
@@ -294,10 +299,6 @@ def unit(vectors):
 
 
 class TestStart:
-    @pytest.fixture(scope="class")
-    def designer(self, creature):
-        return nicmm.Designer(creature)
-
     def moved(self, mesh, points):
         neighbour = mesh.faces[mesh.faces_at(points[1:2])[0]]
         result = points.copy()
