@@ -12,11 +12,11 @@ from . import Status, design_curve, options
 from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
+from .geometry.mirror import parse_plane
 from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
 from .path.via_points import parse_via_points
-from .symmetry.mirror import parse_plane
 
 AUTOMATIC = ("sharp", "curvature")
 """Maps that can be computed from the mesh alone."""

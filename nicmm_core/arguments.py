@@ -15,8 +15,8 @@ from . import options
 from .errors import ArgumentError
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.mesh import Mesh, real_array
+from .geometry.mirror import checked_plane
 from .options import Kind, Option
-from .symmetry.mirror import checked_plane
 
 
 def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:

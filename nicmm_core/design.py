@@ -36,9 +36,11 @@ from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
+from .geometry.mirror import Plane, checked_plane
 from .geometry.surface_points import (
     SurfacePoints,
     check_connected,
+    check_count,
     locate_control_points,
     locate_points,
     nearest_points,
@@ -59,7 +61,6 @@ from .repaired_surface import (
 )
 from .request import Request, same_request
 from .status import Status
-from .symmetry.mirror import Plane, checked_plane
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,
@@ -218,7 +219,6 @@ class Designer:
                 manifold.designer.surface,
                 there,
                 manifold.from_original(positions),
-                (curve.barycentric == 0.0).any(axis=1),
                 curve,
                 design.status,
             )
@@ -247,6 +247,8 @@ class Designer:
             options["corners"] = checked_corners(options["corners"], len(points))
             return Request(points=points, **options)
         given = locate_points(mesh, control_points, "control_points")
+        if not len(given):
+            check_count(0, closed)
         among = self._whole.faces_connected_to(given)
         points, mirror = with_images(mesh, given, plane, closed, order, among)
         crosses = bool(mirror.side[len(given) - 1])  # the last leg of the half leads to the plane

@@ -47,8 +47,8 @@ class Design:
         What was repaired on the copy of the mesh on which the curve was designed, and how often,
         such as ``{"faces turned": 12, "vertices joined": 40}``. Empty for a sound mesh.
     asymmetry : float or None
-        With a mirror, the greatest distance of the curve to its mirror image, in mesh units; zero
-        up to rounding if the surface is symmetric. None without a mirror.
+        With a mirror, the greatest distance of the curve to its mirror image, in mesh units; less
+        than a millionth of the diagonal if the surface is symmetric. None without a mirror.
     """
 
     status: Status

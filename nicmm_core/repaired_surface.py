@@ -90,7 +90,9 @@ class Manifold:
         for copy in self.copies:
             request = mapped_request(request, copy.points_to, copy.weights_to)
         if request.mirror is not None:
-            request = replace(request, mirror=request.mirror.mapped(self.from_original))
+            request = replace(
+                request, mirror=request.mirror.mapped(self.from_original, self.mesh.diagonal)
+            )
         return request
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:

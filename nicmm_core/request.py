@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from .geometry.array_types import BoolArray, FloatArray, IntArray
+from .geometry.mirror import Mirror
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
-from .symmetry.mirror import Mirror
 
 
 @dataclass(frozen=True)

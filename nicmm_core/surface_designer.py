@@ -130,7 +130,7 @@ class SurfaceDesigner:
         if max_iterations is not None:
             config = replace(config, most_iterations=max_iterations)
         found = relaxed_symmetric(
-            request, begin, None, curve.length, partial(_relaxed, request), config
+            request, begin, None, curve.length, partial(_relaxed_unless_cancelled, request), config
         )
         if found is None:
             raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
@@ -198,14 +198,16 @@ class SurfaceDesigner:
         left = None
         if max_iterations is not None:
             left = max_iterations - sum(each.iterations for _, each in curves)
-        found = best_symmetric(given, begins, partial(_relaxed, given), left)
+        relax = partial(_relaxed_unless_cancelled, given)
+        found, cancelled = best_symmetric(given, begins, relax, left)
         best, *others = [
             self._relaxed_design(
                 request, replace(start, visited=number[start.visited]), relaxed, started
             )
             for start, relaxed in found[: 1 + request.alternatives]
         ]
-        return replace(best, alternatives=others)
+        status = Status.CANCELLED if cancelled else best.status
+        return replace(best, status=status, alternatives=others)
 
     def _symmetric_curves(
         self, request: Request, curves: list[tuple[InitialCurve, Relaxed]]

@@ -9,8 +9,8 @@ import numpy as np
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import distinct_rows
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import ON_PLANE, Plane
 from ..repair.face_parts import FaceParts
-from .mirror import ON_PLANE, Plane
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..courses.hop_graph import distances_along_edges
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mirror import Mirror
 from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface
 from ..request import Request
-from .mirror import Mirror
 
 
 def in_shortest_order(surface: CurveSurface, request: Request) -> tuple[Request, IntArray]:

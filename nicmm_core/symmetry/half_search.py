@@ -17,6 +17,7 @@ from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import ON_PLANE
 from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, joined, nearest_points, snapped
 from ..geometry.tolerances import COINCIDENT
@@ -27,7 +28,6 @@ from ..request import Request
 from ..start_search import InitialCurve, StartSearch
 from .half_mesh import HalfMesh, half_mesh
 from .halves import TRIMMED, Half, mirror_of, with_image
-from .mirror import ON_PLANE
 
 MOST_COURSES = 4
 """Greatest number of courses of the half that are made symmetric."""

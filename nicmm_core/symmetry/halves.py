@@ -15,11 +15,11 @@ import numpy as np
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve
+from ..geometry.mirror import ON_PLANE, Mirror
 from ..geometry.surface_points import SurfacePoints, joined
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.discrete_curve import DiscreteCurve, short_segments, without_points
 from ..request import Request
-from .mirror import ON_PLANE, Mirror
 from .reflection import joined_places, reflected_places, with_controls
 
 TRIMMED = 1.0 / 1024.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..design_result import Design
 from ..errors import CurveError
-from ..geometry.array_types import BoolArray, FloatArray
+from ..geometry.array_types import FloatArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.curve_field import curve_field
@@ -25,7 +25,6 @@ def mirrored_design(
     surface: MappedSurface,
     request: Request,
     positions: FloatArray,
-    on_edge: BoolArray,
     curve: SurfaceCurve,
     status: Status,
 ) -> Design:
@@ -38,8 +37,6 @@ def mirrored_design(
         The request with the mirror images of the control points.
     positions : (n, 3) float array
         Mirror images of the points of the curve, in the coordinates of the surface.
-    on_edge : (n,) bool array
-        Which points of the curve are on edges.
     curve : SurfaceCurve
         The curve, on any mesh.
     status : Status
@@ -51,7 +48,7 @@ def mirrored_design(
         If the mirror image cannot be traced, or crosses itself.
     """
     mesh = surface.mesh
-    places = nearest_places(mesh, positions, on_edge)
+    places = nearest_places(mesh, positions, curve.barycentric)
     control = np.full(len(positions), -1)
     control[curve.control_index] = np.arange(len(curve.control_index))
     places = with_controls(places, control, request.points)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, shared_faces
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import Plane
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points
 from ..geometry.tracing import fold_margin, strictly_inside, trace_between
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.node_traces import DETOUR
-from .mirror import Plane
 
 ON_EDGE = 1e-5
 """Barycentric coordinate below which the image of a point on an edge is on an edge as well.
@@ -25,14 +25,16 @@ ON_EDGE = 1e-5
 Coordinates of canonical copies are rounded, so the images of edges are edges only up to that.
 """
 
+OFF_VERTEX = 1e-9
+"""Least of the other coordinates of that image, so that images of two edges do not coincide."""
+
 
 def reflected_places(mesh: Mesh, plane: Plane, points: SurfacePoints) -> SurfacePoints:
     """The places of a mesh nearest to the reflected positions of points on it."""
-    on_edge = (points.barycentric == 0.0).any(axis=1)
-    return nearest_places(mesh, plane.reflected(points.positions(mesh)), on_edge)
+    return nearest_places(mesh, plane.reflected(points.positions(mesh)), points.barycentric)
 
 
-def nearest_places(mesh: Mesh, positions: FloatArray, on_edge: BoolArray) -> SurfacePoints:
+def nearest_places(mesh: Mesh, positions: FloatArray, barycentric: FloatArray) -> SurfacePoints:
     """The places of a mesh nearest to the images of points.
 
     Parameters
@@ -40,15 +42,19 @@ def nearest_places(mesh: Mesh, positions: FloatArray, on_edge: BoolArray) -> Sur
     mesh : Mesh
     positions : (n, 3) float array
         The images of the points.
-    on_edge : (n,) bool array
-        Which points are on edges. The places of the others are strictly inside faces.
+    barycentric : (n, 3) float array
+        Coordinates of the points themselves. The place of a point inside a face is strictly inside
+        a face; that of a point on an edge or at a vertex is on an edge or at a vertex too if it is
+        close to one.
     """
     places, _ = nearest_points(mesh, positions)
-    barycentric = places.barycentric
-    at_edges = np.where(barycentric < ON_EDGE, 0.0, barycentric)
-    at_edges /= at_edges.sum(axis=1, keepdims=True)
-    inside = strictly_inside(barycentric)
-    return SurfacePoints(places.faces, np.where(on_edge[:, None], at_edges, inside))
+    weights, zeros = places.barycentric, (barycentric == 0.0).sum(axis=1)[:, None]
+    rank = weights.argsort(axis=1).argsort(axis=1)
+    on_side = (rank < zeros) & (weights < ON_EDGE)
+    weights = np.where(on_side, 0.0, np.maximum(weights, OFF_VERTEX))
+    weights /= weights.sum(axis=1, keepdims=True)
+    inside = strictly_inside(places.barycentric)
+    return SurfacePoints(places.faces, np.where(zeros == 0, inside, weights))
 
 
 def with_controls(places: SurfacePoints, control: IntArray, points: SurfacePoints) -> SurfacePoints:

@@ -10,6 +10,7 @@ from ..errors import ArgumentError, ControlPointError, PointName
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
+from ..geometry.mirror import ON_PLANE, Mirror, Plane
 from ..geometry.surface_points import (
     SurfacePoints,
     check_count,
@@ -20,10 +21,12 @@ from ..geometry.surface_points import (
     snapped,
 )
 from ..path.via_points import LocatedViaPoints
-from .mirror import ON_PLANE, Mirror, Plane
 
 FARTHEST_IMAGE = 0.05
 """Greatest distance of the mirror image of a point from the surface, in bounding-box diagonals."""
+
+RESOLUTION = 2.0**-36
+"""Unit to which barycentric coordinates of images are rounded."""
 
 ASYMMETRIC = "the mesh is not symmetric enough about this plane there"
 
@@ -102,8 +105,6 @@ def with_images(
     ArgumentError
         If an image is too far from the surface.
     """
-    if not len(points):
-        check_count(0, closed)
     heights = plane.heights(points.positions(mesh))
     side = np.where(np.abs(heights) <= ON_PLANE * mesh.diagonal, 0, np.sign(heights)).astype(int)
     _check_sides(side, closed, order)
@@ -115,7 +116,7 @@ def with_images(
     positions = plane.reflected(points[apart].positions(mesh))
     images, distance = nearest_points(mesh, positions, among)
     _check_distances(mesh, apart, distance)
-    together = joined([points, snapped(images)])
+    together = joined([points, _rounded(snapped(images))])
     names = control_point_names(np.arange(count))
     check_distinct(mesh, points, names)
     of_images = [PointName("mirror images of control_points", index) for index in apart.tolist()]
@@ -131,6 +132,13 @@ def with_images(
     image[apart] = count + np.arange(len(apart))
     image[count:] = apart
     return together, Mirror(plane, image, np.append(side, -np.ones(len(apart), dtype=int)))
+
+
+def _rounded(points: SurfacePoints) -> SurfacePoints:
+    """Points with rounded coordinates, so that the order of the corners makes no difference."""
+    weights = np.round(points.barycentric / RESOLUTION) * RESOLUTION
+    weights[np.arange(len(weights)), weights.argmax(axis=1)] += 1.0 - weights.sum(axis=1)
+    return SurfacePoints(points.faces, weights)
 
 
 def _check_sides(side: IntArray, closed: bool, order: str) -> None:

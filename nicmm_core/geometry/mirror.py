@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError
-from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.mesh import Mesh, real_array
+from .array_types import FloatArray, IntArray
+from .mesh import Mesh, real_array
 
 ON_PLANE = 1e-6
 """Distance from the plane, in bounding-box diagonals, up to which a control point is on it."""
+
+ROUNDED = 1e-10
+"""Unit to which planes on copies of the mesh are rounded, far coarser than rounding errors."""
 
 AXES = ["X", "Y", "Z"]
 
@@ -63,11 +66,21 @@ class Mirror:
     image: IntArray
     side: IntArray
 
-    def mapped(self, positions: Callable[[FloatArray], FloatArray]) -> Mirror:
-        """The mirror on a copy of the mesh; `positions` maps (n, 3) by a similarity."""
+    def mapped(self, positions: Callable[[FloatArray], FloatArray], diagonal: float) -> Mirror:
+        """The mirror on a copy of the mesh, rounded, so that it depends on the surface only.
+
+        Parameters
+        ----------
+        positions : callable
+            Maps positions, (n, 3), to the copy by a similarity.
+        diagonal : float
+            Diagonal of the copy.
+        """
         here, ahead = positions(np.stack([self.plane.point, self.plane.point + self.plane.normal]))
-        normal = (ahead - here) / np.linalg.norm(ahead - here)
-        return replace(self, plane=Plane(here, normal))
+        normal = np.round((ahead - here) / np.linalg.norm(ahead - here) / ROUNDED) * ROUNDED
+        normal /= np.linalg.norm(normal)
+        unit = ROUNDED * diagonal
+        return replace(self, plane=Plane(np.round(here @ normal / unit) * unit * normal, normal))
 
 
 def checked_plane(name: str, given: Any, mesh: Mesh) -> Plane:
