@@ -26,6 +26,9 @@ AUTOMATIC = (
 """A choice of the option `order` that only the extension has, listed before those of the core."""
 
 
+NORMAL_BENDING = 0.3
+"""Default of the option `normal_bending` in Blender; see docs/normal_bending.md."""
+
 CURVE = StringProperty(
     name="Curve Object",
     description="Name of the designed curve. Leave empty for the active one",
@@ -36,7 +39,7 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name; those of single points are left out."""
+    """Blender properties for core options, by property name, without those of single points."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
@@ -72,7 +75,8 @@ def _property(option: Option) -> "bpy.props._PropertyDeferred":
         whole = {name: int(value) for name, value in limits.items()}
         return IntProperty(**words, **whole, default=option.default)
     subtype = "DISTANCE" if option.kind is Kind.LENGTH else "NONE"
-    return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
+    default = NORMAL_BENDING if option.name == "normal_bending" else option.default
+    return FloatProperty(**words, **limits, subtype=subtype, default=default)
 
 
 SURFACE = {
