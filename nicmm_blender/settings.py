@@ -26,6 +26,9 @@ AUTOMATIC = (
 """A choice of the option `order` that only the extension has, listed before those of the core."""
 
 
+NORMAL_BENDING = 0.3
+"""Default of the option `normal_bending` in Blender; see docs/normal_bending.md."""
+
 CURVE = StringProperty(
     name="Curve Object",
     description="Name of the designed curve. Leave empty for the active one",
@@ -72,7 +75,8 @@ def _property(option: Option) -> "bpy.props._PropertyDeferred":
         whole = {name: int(value) for name, value in limits.items()}
         return IntProperty(**words, **whole, default=option.default)
     subtype = "DISTANCE" if option.kind is Kind.LENGTH else "NONE"
-    return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
+    default = NORMAL_BENDING if option.name == "normal_bending" else option.default
+    return FloatProperty(**words, **limits, subtype=subtype, default=default)
 
 
 SURFACE = {
