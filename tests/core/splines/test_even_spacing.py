@@ -10,7 +10,16 @@ from nicmm_core import shapes
 from nicmm_core.geometry.tolerances import CLEAN_CURVE, of_clean_curve
 from nicmm_core.splines.even_spacing import even_curve, even_places
 from tests.core.checks import circle
-from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
+from tests.core.splines.clean_curves import (
+    DESIGNS,
+    SQUARE,
+    designed,
+    designed_square,
+    irregular,
+    square,
+    strays,
+    subdivided,
+)
 
 NONE = np.zeros(0, dtype=np.int64)
 ROUNDED = 1.0 + 1e-9
@@ -84,6 +93,15 @@ def test_corners_are_points():
         places, _ = assert_even(points, True, NONE, 1e-4)
         assert len(places) == 4
         assert strays(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), places, True) == 0.0
+
+
+def test_a_square_designed_with_corners():
+    """Its corners are points, and no point between them leaves the sides."""
+    curve = designed_square()
+    places, index = assert_even(curve.points, True, curve.control_index, 1e-4)
+    np.testing.assert_allclose(places[index], SQUARE, atol=1e-12)
+    np.testing.assert_allclose(np.abs(places[:, :2]).max(axis=1), 0.5, atol=2e-4)
+    assert len(places) <= 12
 
 
 def test_corners_between_control_points_need_few_points():
