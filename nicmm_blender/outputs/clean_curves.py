@@ -60,10 +60,24 @@ class Knots:
 Spline = Polyline | Knots
 
 
-def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list[Spline]:
-    """The splines that show curves, each a `Polyline` or `Knots`."""
+def splines(
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    drawing: Drawing,
+    corners: np.ndarray,
+) -> list[Spline]:
+    """The splines that show curves, each a `Polyline` or `Knots`.
+
+    `corners`, (k,), tells which of their control points are corners, where the handles of knots are
+    free. Polylines have a point at every control point, so they are sharp there anyway.
+    """
     if drawing.spline == BEZIER:
-        return [_knots(surface, curve, drawing) for curve in curves]
+        passed = [curve.control_index[curve.control_index >= 0] for curve in curves]
+        sharp = np.split(corners, np.cumsum([len(index) for index in passed]))[:-1]
+        return [
+            _knots(surface, curve, drawing, index[here])
+            for curve, index, here in zip(curves, passed, sharp, strict=True)
+        ]
     return [
         Polyline(curve.closed, _offset_points(surface, curve, drawing.offset))
         for curve in on_surface(surface, curves, drawing)
@@ -87,18 +101,20 @@ def automatic_radius(surface: Surface, radius: float, thickness: float) -> float
     return radius or thickness * surface.diagonal * surface.scale
 
 
-def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing) -> Knots:
+def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing, corners: np.ndarray) -> Knots:
+    """Knots on a curve; their handles are free at the points with the indices `corners`."""
     from ...nicmm_core.splines.bezier import fit_bezier
 
     mesh = surface_cache.core_mesh(surface)
     points = _offset_points(surface, curve, drawing.offset) @ surface.local_to_core.T
     tolerance = _tolerance(surface, mesh, drawing)
-    fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance)
+    fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance, corners)
     back = np.linalg.inv(surface.local_to_core).T
     left, right = fitted.left - fitted.knots, fitted.right - fitted.knots
     across = np.linalg.norm(np.cross(left, right), axis=1)
     sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=1)
     smooth = (across <= COLLINEAR * sizes) & (np.einsum("nj,nj->n", left, right) < 0.0)
+    smooth[fitted.control_index[np.isin(curve.control_index, corners)]] = False
     return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
 
 
