@@ -404,6 +404,54 @@ def live_between(blender: Blender) -> None:
     blender.wait(f"helper.state() == {before!r}", "undo after these steps")
 
 
+def corners(blender: Blender) -> None:
+    """A key over a point makes it a corner; elsewhere nothing happens."""
+    step("J over a point makes it a corner, and again makes the curve smooth there")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    states = click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
+    are_corners = "list(helper.curve()['nicmm_curve']['corner_points'])"
+    states = states[-1:]
+    for number, wanted in ((3, [0, 0, 0, 1, 0]), (0, [1, 0, 0, 1, 0]), (1, [1, 1, 0, 1, 0])):
+        blender.move(pixel_of(blender, number))
+        time.sleep(0.5)
+        blender.key("j")
+        blender.wait(f"{are_corners} == {wanted}", f"point {number} is a corner")
+        states.append(state(blender))
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("18-corners")
+    undo_and_redo(blender, states, "of corners")
+    blender.move(pixel_of(blender, 1))
+    time.sleep(0.5)
+    blender.key("j")
+    blender.wait(f"{are_corners} == [1, 0, 0, 1, 0]", "the corner is none any more")
+
+    step("J beside a point and beside the mesh changes nothing")
+    before = state(blender)
+    for place in ("helper.pixels(helper.in_front([(0.0, 0.75)]))", "helper.pixels([-1.3, 0, 0.9])"):
+        blender.move(blender.do(f"value = {place}")[0])
+        time.sleep(0.5)
+        blender.key("j")
+        time.sleep(1.0)
+        check(state(blender) == before, "nothing changes")
+
+    step("A corner stays one while it is dragged")
+    drag(blender, pixel_of(blender, 3), 20, (1.5, 1.0), "18-corner-dragged")
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {before!r}", "the dragged curve")
+    blender.wait(f"{are_corners} == [1, 0, 0, 1, 0]", "the same corners")
+
+    step("Normal Bending in the header and in the sidebar")
+    before = state(blender)
+    blender.do("helper.area().spaces.active.show_region_ui = True")
+    blender.do("helper.curve().nicmm_settings.normal_bending = 1.0")
+    blender.wait(f"helper.state() != {before!r}", "another curve")
+    blender.shot("19-normal-bending")
+    blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
 def picking(blender: Blender) -> None:
     """Clicks act on what is visible: hidden parts, X-ray, other curves, other objects."""
     step("From the side: hidden parts are dimmed")
@@ -560,7 +608,7 @@ def other_modes(blender: Blender) -> None:
 
 def keys(blender: Blender) -> None:
     """The keymap editor, the Industry Compatible keymap, and Emulate 3 Button Mouse."""
-    step("The tool's keys are in the keymap editor, without letters")
+    step("The tool's keys are in the keymap editor, with one letter")
     found = blender.do(
         "maps = bpy.context.window_manager.keyconfigs.user.keymaps\n"
         "value = [[each.name, [[item.idname, item.type, item.value] for item in each.keymap_items]]"
@@ -568,8 +616,9 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 5, f"five items in {name}")
-        check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
+        check(len(items) == 6, f"six items in {name}")
+        letters = [kind for _, kind, _ in items if len(kind) == 1]
+        check(letters == ["J"], f"one letter in {name}")
     for config in ("Industry_Compatible", "Blender"):
         step(f"The keymap {config}")
         blender.do(f"helper.keymap({config!r})")
@@ -766,6 +815,7 @@ PARTS = {
     "live": live_between,
     "picking": picking,
     "ridge": ridge,
+    "corners": corners,
     "bodies": other_bodies,
     "modes": other_modes,
     "methods": methods,
