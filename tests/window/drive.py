@@ -27,6 +27,9 @@ INSIDE = Path(__file__).resolve().with_name("inside.py")
 PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
 DRAGGED, JUMPING = 3, 1
 
+SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))
+"""Sideways and backwards on the crown of Suzanne's head; with three corners, a shield."""
+
 SMOOTHNESS = (150, 68)
 """Pixel of the field in the header."""
 
@@ -408,48 +411,50 @@ def corners(blender: Blender) -> None:
     """A key over a point makes it a corner; elsewhere nothing happens."""
     step("J over a point makes it a corner, and again makes the curve smooth there")
     blender.do("helper.suzanne()")
-    blender.do("helper.look()")
+    blender.do("helper.look(0.15, 0.75, 1.0)")
     choose_tool(blender)
     blender.do('bpy.ops.ed.undo_push(message="Start")')
-    states = click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
-    are_corners = "list(helper.curve()['nicmm_curve']['corner_points'])"
-    states = states[-1:]
-    for number, wanted in ((3, [0, 0, 0, 1, 0]), (0, [1, 0, 0, 1, 0]), (1, [1, 1, 0, 1, 0])):
-        blender.move(pixel_of(blender, number))
-        time.sleep(0.5)
-        blender.key("j")
-        blender.wait(f"{are_corners} == {wanted}", f"point {number} is a corner")
+    states = click_places(blender, blender.do(f"value = helper.from_above({SHIELD})"))[-1:]
+    blender.shot("18-no-corners")
+    for number, wanted in ((4, [4]), (2, [2, 4]), (0, [0, 2, 4])):
+        toggle_corner(blender, number, wanted)
         states.append(state(blender))
-    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    beside = blender.do("value = helper.pixels([-1.2, 0, 1.2])")[0]
+    blender.move(beside)
     blender.shot("18-corners")
     undo_and_redo(blender, states, "of corners")
-    blender.move(pixel_of(blender, 1))
-    time.sleep(0.5)
-    blender.key("j")
-    blender.wait(f"{are_corners} == [1, 0, 0, 1, 0]", "the corner is none any more")
+    toggle_corner(blender, 2, [0, 4])
 
     step("J beside a point and beside the mesh changes nothing")
     before = state(blender)
-    for place in ("helper.pixels(helper.in_front([(0.0, 0.75)]))", "helper.pixels([-1.3, 0, 0.9])"):
-        blender.move(blender.do(f"value = {place}")[0])
+    for pixel in (blender.do("value = helper.pixels(helper.from_above([(0, 0.3)]))")[0], beside):
+        blender.move(pixel)
         time.sleep(0.5)
         blender.key("j")
         time.sleep(1.0)
         check(state(blender) == before, "nothing changes")
 
     step("A corner stays one while it is dragged")
-    drag(blender, pixel_of(blender, 3), 20, (1.5, 1.0), "18-corner-dragged")
+    drag(blender, pixel_of(blender, 4), 20, (1.5, 1.0), "18-corner-dragged")
     blender.mouse("mouseup", 1)
     blender.wait(f"helper.state() != {before!r}", "the dragged curve")
-    blender.wait(f"{are_corners} == [1, 0, 0, 1, 0]", "the same corners")
+    blender.wait("helper.corners() == [0, 4]", "the same corners")
 
     step("Normal Bending in the header and in the sidebar")
     before = state(blender)
-    blender.do("helper.area().spaces.active.show_region_ui = True")
+    blender.do("helper.show_sidebar()")
     blender.do("helper.curve().nicmm_settings.normal_bending = 1.0")
     blender.wait(f"helper.state() != {before!r}", "another curve")
     blender.shot("19-normal-bending")
     blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
+def toggle_corner(blender: Blender, number: int, wanted: list) -> None:
+    """Press the key over a point, and wait for the corners that the curve then has."""
+    blender.move(pixel_of(blender, number))
+    time.sleep(0.5)
+    blender.key("j")
+    blender.wait(f"helper.corners() == {wanted}", f"corners {wanted}")
 
 
 def picking(blender: Blender) -> None:
