@@ -69,31 +69,44 @@ def splines(
     """The splines that show curves, each a `Polyline` or `Knots`.
 
     `corners`, (k,), tells which of their control points are corners, where the handles of knots are
-    free. Polylines have a point at every control point, so they are sharp there anyway.
+    free.
     """
     if drawing.spline == BEZIER:
-        passed = [curve.control_index[curve.control_index >= 0] for curve in curves]
-        sharp = np.split(corners, np.cumsum([len(index) for index in passed]))[:-1]
         return [
-            _knots(surface, curve, drawing, index[here])
-            for curve, index, here in zip(curves, passed, sharp, strict=True)
+            _knots(surface, curve, drawing, sharp)
+            for curve, sharp in zip(curves, _indices(curves, corners), strict=True)
         ]
     return [
         Polyline(curve.closed, _offset_points(surface, curve, drawing.offset))
-        for curve in on_surface(surface, curves, drawing)
+        for curve in on_surface(surface, curves, drawing, corners)
     ]
 
 
 def on_surface(
-    surface: Surface, curves: list[SurfaceCurve], drawing: Drawing
+    surface: Surface, curves: list[SurfaceCurve], drawing: Drawing, corners: np.ndarray
 ) -> Sequence[SurfaceCurve | SampledCurve]:
-    """Curves of the core whose points are those of the polylines to draw."""
+    """Curves of the core whose points are those of the polylines to draw.
+
+    They have a point at every control point. `corners`, (k,), tells which of these are corners;
+    evenly spaced points are close to these, so that a tube is not thinner further away.
+    """
     if drawing.spline == EXACT:
         return curves
     from ...nicmm_core.splines.even_spacing import even_curve
 
     mesh = surface_cache.core_mesh(surface)
-    return [even_curve(mesh, curve, _tolerance(surface, mesh, drawing)) for curve in curves]
+    tolerance, radius = _tolerance(surface, mesh, drawing), drawing.radius / surface.unit
+    return [
+        even_curve(mesh, curve, tolerance, sharp, beside=radius)
+        for curve, sharp in zip(curves, _indices(curves, corners), strict=True)
+    ]
+
+
+def _indices(curves: list[SurfaceCurve], corners: np.ndarray) -> list[np.ndarray]:
+    """The indices of corners among the points of each curve."""
+    passed = [curve.control_index[curve.control_index >= 0] for curve in curves]
+    sharp = np.split(corners, np.cumsum([len(index) for index in passed]))[:-1]
+    return [index[here] for index, here in zip(passed, sharp, strict=True)]
 
 
 def automatic_radius(surface: Surface, radius: float, thickness: float) -> float:

@@ -129,7 +129,7 @@ def as_object(
     radius = automatic_radius(surface, settings.radius, settings.thickness)
     drawing = Drawing(settings.spline, radius, settings.offset)
     if settings.output == "STICKY":
-        return sticky_curves.add(mesh_object, surface, curves, drawing, settings.tube)
+        return sticky_curves.add(mesh_object, surface, curves, drawing, corners, settings.tube)
     shown = splines(surface, curves, drawing, corners)
     return curve_object.new_object(mesh_object, surface, shown, radius)
 
@@ -155,7 +155,7 @@ def redraw(
     radius = tube_radius.radius_of(drawn) * curve_object.scale_of(drawn, surface)
     drawing = Drawing(radius=radius, **kind)
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn, surface, curves, drawing)
+        sticky_curves.write(drawn, surface, curves, drawing, corners)
     else:
         curve_object.write_splines(drawn, splines(surface, curves, drawing, corners))
 
@@ -176,10 +176,10 @@ def show_unfinished(drawn: bpy.types.Object, surface: Surface, curve: SurfaceCur
     """Show a curve that is being changed in its object, with all points of the exact curve."""
     kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
     drawing = Drawing(EXACT, 0.0, kind["offset"])
+    no_corners = np.zeros(0, dtype=bool)  # exact curves are sharp anyway
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn, surface, [curve], drawing)
+        sticky_curves.write(drawn, surface, [curve], drawing, no_corners)
     else:
-        no_corners = np.zeros(0, dtype=bool)  # exact curves are sharp anyway
         curve_object.write_splines(drawn, splines(surface, [curve], drawing, no_corners))
 
 

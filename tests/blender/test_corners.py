@@ -8,6 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
 from tests.blender import scenes
 from tests.blender.scenes import module
 from tests.blender.test_point_operators import call, content, refusal
@@ -108,6 +111,33 @@ def test_sticky_curves(plane, spline):
     points = scenes.evaluated_points(curve)
     assert off_square(points) < STRAIGHT
     assert all(is_passed(points, place) for place in SQUARE)
+
+
+def test_a_tube_is_as_thick_beside_a_corner_as_elsewhere(plane):
+    """Blender's tube is thinner at the corner itself."""
+    radius = 0.03
+    curve = draw(corners="0, 1, 2, 3", spline="EVEN", radius=radius)
+    assert len(curve.data.splines[0].points) < 60
+    evaluated = curve.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    tube = BVHTree.FromPolygons(
+        [vertex.co for vertex in mesh.vertices], [face.vertices[:] for face in mesh.polygons]
+    )
+    for along in np.linspace(-0.5 + 1.1 * radius, 0.5 - 1.1 * radius, 60):
+        for start, towards in (((along, -2.0), (0.0, 1.0)), ((2.0, along), (-1.0, 0.0))):
+            place = tube.ray_cast(Vector((*start, 0.0)), Vector((*towards, 0.0)))[0]
+            assert off_square([place]) == pytest.approx(radius, rel=0.06)
+
+
+@pytest.mark.parametrize("output", ["STICKY", "CURVE"])
+def test_updates_keep_the_points_beside_corners(plane, output):
+    curve = draw(corners="0, 1, 2, 3", spline="EVEN", radius=0.03, output=output)
+    for _ in range(2):
+        points = scenes.evaluated_points(curve) if output == "STICKY" else scenes.points(curve)
+        for place in SQUARE:
+            nearest = np.sort(np.linalg.norm(points - place, axis=1))[:3]
+            np.testing.assert_allclose(nearest, [0.0, 0.03, 0.03], atol=1e-5)
+        assert bpy.ops.nicmm.update_curves(curve=curve.name) == {"FINISHED"}
 
 
 @pytest.mark.parametrize("output", ["EDGES", "PARTS"])
