@@ -608,6 +608,9 @@ def other_modes(blender: Blender) -> None:
         blender.mouse("mouseup", 1)
         blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
         time.sleep(0.6)
+        dragged = state(blender)
+        toggle_corner(blender, 2, [2])
+        undo_and_redo(blender, [dragged, state(blender)], f"of a corner in {mode}")
         blender.do("helper.switch('Suzanne', 'OBJECT')")
 
 
