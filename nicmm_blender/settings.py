@@ -37,6 +37,15 @@ CURVE = StringProperty(
 """The property of operators that names a designed curve."""
 
 
+CORNERS = StringProperty(
+    name="Corners",
+    description="Control points at which the curve may turn freely, for scripts: their indices "
+    "among the points given, from 0, separated by commas, such as 0, 2",
+    options={"HIDDEN", "SKIP_SAVE"},
+)
+"""The property of operators that names corners."""
+
+
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
     """Blender properties for core options, without those of compound kinds."""

@@ -21,6 +21,7 @@ import numpy as np
 from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
 from . import mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
+from .control_points import ControlPoints
 from .lookup import is_in
 from .messages import InputError, check_finite
 from .record_check import Record
@@ -88,10 +89,10 @@ class CurveSettings:
     closed: bool = True
     method: str = "ELASTIC"
     smoothness: float = 1.0
+    normal_bending: float = 0.0
     obstacle_group: str = ""
     clearance: float = 0.0
     alignment_group: str = ""
-    normal_bending: float = 0.0
     use_modifiers: bool = True
 
     def __post_init__(self) -> None:
@@ -147,6 +148,7 @@ def write_record(
     curves: list[SurfaceCurve],
     settings: CurveSettings,
     drawn: Drawn | None,
+    corners: np.ndarray,
     controls: SurfacePoints | None = None,
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
@@ -166,6 +168,8 @@ def write_record(
     drawn : dict or None
         Spline type and offset of the drawing; None for an object of an earlier version, which drew
         all points.
+    corners : (k,) bool array
+        Whether each control point is a corner.
     controls : SurfacePoints, optional
         Control points; by default those of the curves.
     """
@@ -197,6 +201,7 @@ def write_record(
         "control_corners": surface.faces[control_faces].ravel().tolist(),
         "control_barycentric": control_barycentric.ravel().tolist(),
         **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
+        "corner_points": corners.astype(int).tolist(),
         "asked": asdict(settings),
         **({} if drawn is None else {"drawn": drawn}),
     }
@@ -476,7 +481,7 @@ def read_control_points(
 
 def current_control_points(
     curve_object: bpy.types.Object, mesh_object: bpy.types.Object, surface: Surface
-) -> tuple[SurfacePoints, int]:
+) -> tuple[ControlPoints, int]:
     """The control points of a curve on the current surface, and how many of them were moved.
 
     A point whose triangle no longer exists is located by the face of the cage that it came from. If
@@ -501,7 +506,18 @@ def current_control_points(
         mesh = surface_cache.core_mesh(surface)
         nearest, _ = nearest_points(mesh, positions[lost] @ surface.local_to_core.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
-    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
+    places = nicmm.SurfacePoints(faces, barycentric)
+    return ControlPoints(places, corners_of(curve_object)), int(lost.sum())
+
+
+def corners_of(curve_object: bpy.types.Object) -> np.ndarray:
+    """Whether each control point of a curve is a corner, (k,)."""
+    record = _checked_record(curve_object)
+    if "control_corners" not in record:  # an early record without control points
+        return np.zeros(sum(index >= 0 for index in record["control_index"]), dtype=bool)
+    if "corner_points" not in record:  # of a version without corners
+        return np.zeros(len(record["control_corners"]) // 3, dtype=bool)
+    return np.array(record["corner_points"], dtype=bool)
 
 
 def _cage_points(
