@@ -46,6 +46,10 @@ class Design:
     repairs : dict of str to int
         What was repaired on the copy of the mesh on which the curve was designed, and how often,
         such as ``{"faces turned": 12, "vertices joined": 40}``. Empty for a sound mesh.
+    relative_energy : float
+        For an alternative, its energy divided by that of the fairest curve; 1 for all other
+        designs. The energy is that by which alternatives are sorted. What maps contribute to the
+        difference counts in units of the energy without maps, since with maps it may be negative.
     """
 
     status: Status
@@ -58,6 +62,7 @@ class Design:
     resumable: Resumable | None = dataclass_field(default=None, repr=False, compare=False)
     alternatives: list[Design] = dataclass_field(default_factory=list)
     repairs: dict[str, int] = dataclass_field(default_factory=dict)
+    relative_energy: float = 1.0
 
     def __repr__(self) -> str:
         return (

@@ -246,6 +246,12 @@ class Improvement:
         """Index of the curve of least energy."""
         return self.energies.index(min(self.energies))
 
+    def relative_energies(self) -> list[float]:
+        """Energies relative to that of the best curve, which is taken without maps."""
+        energies, best = self.energies, self.best
+        unit = self._elastic_energy(self.curves[best])
+        return [1.0 + (energy - energies[best]) / unit for energy in energies]
+
     def by_energy(self) -> list[int]:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self._surface, self.curves, self.energies)

@@ -137,8 +137,14 @@ class SurfaceDesigner:
                 improvement.improve(courses, by_course)
             except CancelledError:
                 cancelled = True
+        energies = improvement.relative_energies()
         best, *others = [
-            self._relaxed_design(request, improvement.starts[i], improvement.relaxed[i], started)
+            replace(
+                self._relaxed_design(
+                    request, improvement.starts[i], improvement.relaxed[i], started
+                ),
+                relative_energy=energies[i],
+            )
             for i in improvement.by_energy()[: 1 + request.alternatives]
         ]
         status = Status.CANCELLED if cancelled else best.status

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ..operators.error_reports import with_error_reports
+from ..operators.error_reports import called, with_error_reports
 from ..operators.sliced_operator import SlicedOperator
 from ..scene import surface_cache
 from . import modes, picking
@@ -84,12 +84,7 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
         operator, arguments = call
         if "from_mouse" in arguments:
             arguments["from_mouse"] = self._is_down
-        try:
-            operator("INVOKE_DEFAULT", True, **arguments)
-        except RuntimeError as error:  # Blender raises what the operator has reported
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        return called(self, operator, "INVOKE_DEFAULT", **arguments)
 
 
 def _call_of(

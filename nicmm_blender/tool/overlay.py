@@ -88,7 +88,7 @@ def show_dragged(
         opened.surface.points(points.faces, points.barycentric),
         edited_curve.polyline_of(opened.surface, curve),
         problem,
-        _radius_of(opened),
+        radius_of(opened),
     )
 
 
@@ -127,7 +127,7 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
     except (InputError, NicmmError):
         return None  # a click reports the error
     points, line = opened.positions(), opened.polyline()
-    return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
+    return _Drawn(opened.mesh_uid, opened.surface, points, line, "", radius_of(opened))
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
@@ -137,7 +137,8 @@ def _hover_on(drawn: _Drawn) -> picking.Hit | None:
     return hit if marks else None
 
 
-def _radius_of(opened: Opened) -> float:
+def radius_of(opened: Opened) -> float:
+    """How far the curve object reaches from its line; see `picking.radius_of`."""
     curve = opened.curve_object
     return 0.0 if curve is None else picking.radius_of(curve, opened.surface)
 
@@ -147,24 +148,29 @@ def _draw_lines() -> None:
     drawn = _drawn_now(context)
     if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
-    colours = _Colours(context)
-    nearer = _towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
+    colours = Colours(context)
+    nearer = towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
     if len(drawn.line):
         colour = colours.problem if drawn.problem else colours.line
-        _draw_line(context, nearer, _line_batch(drawn.line), colour)
+        draw_line(context, nearer, _line_batch(drawn.line), colour)
     hit = _hover_on(drawn)
     if hit is not None and hit.kind is Kind.CURVE:
         for line in picking.other_lines(context):
             if line.name == hit.name and len(line.positions) > 1:
-                nearer = _towards_the_eye(
+                nearer = towards_the_eye(
                     context.region_data, mesh_object, drawn.surface, line.radius
                 )
-                _draw_line(context, nearer, _batch(line.positions), colours.hover)
+                draw_line(context, nearer, batch_of_line(line.positions), colours.hover)
 
 
-def _draw_line(
-    context: bpy.types.Context, matrix: Matrix, batch: gpu.types.GPUBatch, colour: Colour
+def draw_line(
+    context: bpy.types.Context,
+    matrix: Matrix,
+    batch: gpu.types.GPUBatch,
+    colour: Colour,
+    line_width: float = LINE_WIDTH,
 ) -> None:
+    """Draw a line with an outline; parts that the mesh hides are dimmed."""
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region, scale = context.region, context.preferences.system.ui_scale
     hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
@@ -174,7 +180,7 @@ def _draw_line(
         gpu.matrix.load_matrix(matrix)
         shader.bind()
         shader.uniform_float("viewportSize", (region.width, region.height))
-        for width, shade in ((LINE_WIDTH + 2.0 * OUTLINE_WIDTH, OUTLINE), (LINE_WIDTH, colour)):
+        for width, shade in ((line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)):
             shader.uniform_float("lineWidth", width * scale)
             for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", 1.0)):
                 gpu.state.depth_test_set(test)
@@ -187,11 +193,12 @@ def _draw_line(
 def _line_batch(line: np.ndarray) -> gpu.types.GPUBatch:
     """The batch of the active line, rebuilt only if the line has changed."""
     if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
-        _state.batch, _state.batch_of = _batch(line), line
+        _state.batch, _state.batch_of = batch_of_line(line), line
     return _state.batch
 
 
-def _batch(line: np.ndarray) -> gpu.types.GPUBatch:
+def batch_of_line(line: np.ndarray) -> gpu.types.GPUBatch:
+    """The batch of a line, (n, 3), for `draw_line`."""
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     return batch_for_shader(shader, "LINE_STRIP", {"pos": line.astype(np.float32)})
 
@@ -202,7 +209,7 @@ def _draw_points() -> None:
     if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)
-    colours = _Colours(context)
+    colours = Colours(context)
     positions, marked = drawn.points, -1
     fills = [colours.point] * len(positions)
     hit = _hover_on(drawn)
@@ -253,7 +260,7 @@ def _visible(view: View, positions: np.ndarray) -> np.ndarray:
     return _state.visible
 
 
-class _Colours:
+class Colours:
     """Gizmo colours of the theme, which differ from its selection colours."""
 
     def __init__(self, context: bpy.types.Context) -> None:
@@ -272,7 +279,7 @@ def _disc() -> np.ndarray:
 _DISC = _disc()
 
 
-def _towards_the_eye(
+def towards_the_eye(
     region_3d: bpy.types.RegionView3D,
     mesh_object: bpy.types.Object,
     surface: Surface,

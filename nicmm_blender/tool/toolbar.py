@@ -8,6 +8,7 @@ from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
 from ..scene import mesh_data
 from . import modes
+from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
 from .point_operators import NICMM_OT_end_curve
 
@@ -24,6 +25,12 @@ KEYMAP = (
     (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
+    (NICMM_OT_choose_course.bl_idname, {"type": "RET", "value": "PRESS", "shift": True}, None),
+    (
+        NICMM_OT_choose_course.bl_idname,
+        {"type": "NUMPAD_ENTER", "value": "PRESS", "shift": True},
+        None,
+    ),
 )
 """Mouse buttons and keys of the tool.
 
@@ -35,6 +42,7 @@ HINTS = (
     (("MOUSE_LMB_DRAG",), "Move Point"),
     (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
     (("EVENT_RETURN",), "End Curve"),
+    (("EVENT_SHIFT", "EVENT_RETURN"), "Choose Course"),
 )
 
 
@@ -58,6 +66,9 @@ class _SurfaceCurve:
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)
             layout.operator(NICMM_OT_next_course.bl_idname)
+            choosing = layout.row()
+            choosing.operator_context = "INVOKE_REGION_WIN"  # the mouse is used in the viewport
+            choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness"):

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 OFFSET = 2e-3
 """Offset towards the eye for drawing and visibility tests, relative to the mesh diagonal."""
 
+SAMPLES = 64
+"""Points of a line at which the place of its label is sought."""
+
 BEHIND = 1e-7
 """Step past a hidden face, relative to the rest of the line of sight."""
 
@@ -143,6 +146,30 @@ class View:
             return None
         best = int(near[away[near].argmin()])
         return best, float(share[best])
+
+    def label_places(self, lines: list[np.ndarray]) -> np.ndarray:
+        """Pixels for a label beside each polyline, (n, 2); NaN if no part of a line is visible.
+
+        They are where the visible parts of a line are farthest from all other lines.
+        """
+        samples = [
+            line[np.linspace(0, len(line) - 1, min(len(line), SAMPLES)).astype(int)]
+            for line in lines
+        ]
+        flat = [self.project(each) for each in samples]
+        places = np.full((len(lines), 2), np.nan)
+        for number, (sample, pixels) in enumerate(zip(samples, flat, strict=True)):
+            seen = self.visible(sample) & (pixels >= 0.0).all(axis=1)
+            pixels = pixels[seen & (pixels <= self.size).all(axis=1)]
+            others = [other for each, other in enumerate(flat) if each != number]
+            if len(pixels) and others:
+                there = np.concatenate(others)
+                there = there[np.isfinite(there).all(axis=1)]
+                away = np.linalg.norm(pixels[:, None] - there, axis=2).min(axis=1, initial=np.inf)
+                places[number] = pixels[away.argmax()]
+            elif len(pixels):
+                places[number] = pixels[len(pixels) // 2]
+        return places
 
     def _in_pixels(self, positions: np.ndarray, radius: float) -> np.ndarray:
         """Size in pixels, (n,), of a length parallel to the screen at each position."""

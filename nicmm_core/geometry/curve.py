@@ -112,6 +112,25 @@ def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
+def points_of_leg(curve: SurfaceCurve, leg: int) -> IntArray:
+    """Indices of the points of a leg, from its control point to the next one, both included."""
+    index, count = curve.control_index, len(curve.faces)
+    start, end = index[leg], index[(leg + 1) % len(index)]
+    return np.arange(start, end + count * (curve.closed and end <= start) + 1) % count
+
+
+def along_leg(curve: SurfaceCurve, leg: int, positions: FloatArray) -> FloatArray:
+    """How far along a leg the nearest point to each position, (k, 3), is, counted in segments."""
+    line = curve.points[points_of_leg(curve, leg)]
+    start, step = line[:-1], np.diff(line, axis=0)
+    squared = np.maximum((step * step).sum(axis=1), np.finfo(np.float64).tiny)
+    share = ((positions[:, None] - start) * step).sum(axis=2) / squared
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(start + share[:, :, None] * step - positions[:, None], axis=2)
+    nearest = away.argmin(axis=1)
+    return nearest + np.take_along_axis(share, nearest[:, None], axis=1)[:, 0]
+
+
 def checked_curve(
     mesh: Mesh, curve: SurfaceCurve, across_gaps: bool = False
 ) -> tuple[SurfaceCurve, IntArray]:

@@ -18,6 +18,7 @@ OPERATORS = (
     "edit_curve",
     "update_curves",
     "next_course",
+    "choose_course",
     "new_map",
     "paint_map",
     "add_point",

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The base of the operators that search for the courses of a curve.
+
+Dragging and updating keep the course of a curve, even if another one has become fairer. These
+operators search for courses again, and the user chooses one of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
+from ..scene import curve_record, surface_cache
+from ..scene.design_request import DesignRequest
+from ..scene.messages import InputError
+from . import polls
+from .long_solves import LongSolves
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve
+    from ..scene.design_request import Answer
+
+ALTERNATIVES = 4
+"""Greatest number of courses besides the fairest one."""
+
+Key = tuple[str, bytes, bytes]
+
+
+@dataclass(frozen=True)
+class Course:
+    """A curve along one of the courses through the same points.
+
+    Attributes
+    ----------
+    curve : SurfaceCurve of the core
+    energy : float
+        Energy relative to that of the fairest course.
+    """
+
+    curve: SurfaceCurve
+    energy: float
+
+
+_found: dict[Key, list[Course]] = {}
+"""The courses of the last search by what they depend on, so that a next call takes no time."""
+
+
+class CourseSearch(LongSolves):
+    """A mixin for operators with `use_courses(context, opened, courses)`.
+
+    It searches for the courses of a curve, the fairest first, unless they are known.
+    """
+
+    curve: str
+    """Property of the operators: the name of the curve."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        has_curve = edited_curve.active(context) is not None
+        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
+
+    def use_courses(
+        self, context: bpy.types.Context, opened: Opened, courses: list[Course]
+    ) -> set[str]:
+        """Use the courses that were found."""
+        raise NotImplementedError
+
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
+        edited = edited_curve.chosen(context, self.curve)
+        if edited is None:
+            raise InputError(polls.NO_CURVE)
+        if not curve_record.has_curve(edited):
+            raise InputError(curve_record.no_curve_message(edited))
+        self._opened = edited_curve.open_curve(context, edited)
+        self._key = _key(self._opened)
+        if self._key in _found:
+            return []
+        (request,) = edited_curve.request(self._opened, self._opened.points)
+        options = {**request.options, "alternatives": ALTERNATIVES}
+        return [replace(request, start=None, options=options)]
+
+    def finish(
+        self, context: bpy.types.Context, _requests: list[DesignRequest], answers: list[Answer]
+    ) -> set[str]:
+        if answers:
+            fairest = edited_curve.design_of(answers[0])
+            designs = [fairest, *fairest.alternatives]
+            _found.clear()
+            _found[self._key] = [Course(each.curves[0], each.relative_energy) for each in designs]
+        if self._opened.curve_object is None:
+            raise InputError(edited_curve.DELETED)
+        return self.use_courses(context, self._opened, _found[self._key])
+
+
+def index_of_current(opened: Opened, courses: list[Course]) -> int | None:
+    """The index of the course that a curve takes; None if it takes none of them."""
+    from ...nicmm_core.courses.comparison import current_course
+
+    if opened.curve is None:
+        return None
+    curves = [course.curve for course in courses]
+    return current_course(surface_cache.core_mesh(opened.surface), opened.curve, curves)
+
+
+def is_only_course(current: int | None, courses: list[Course]) -> bool:
+    """Whether the curve takes the only course that was found."""
+    return len(courses) == 1 and current == 0
+
+
+def no_other_course(opened: Opened) -> str:
+    """The report that a curve takes the only course that was found."""
+    return f'No other course of "{opened.curve_object.name}" was found'
+
+
+def _key(opened: Opened) -> Key:
+    """Everything that the courses of a curve depend on."""
+    points = opened.points
+    on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
+    return on, points.faces.tobytes(), points.barycentric.tobytes()
+
+
+@persistent
+def forget(*_arguments: object) -> None:
+    """Drop the courses found before another file is opened."""
+    _found.clear()
+
+
+def register() -> None:
+    bpy.app.handlers.load_pre.append(forget)
+
+
+def unregister() -> None:
+    forget()
+    bpy.app.handlers.load_pre.remove(forget)
