@@ -20,8 +20,8 @@ PREVIOUS = {"WHEELUPMOUSE", "UP_ARROW", "LEFT_ARROW"}
 ENTER = {"RET", "NUMPAD_ENTER"}
 
 HINT = (
-    "Wheel, Arrow Keys, Shift Enter: Change   |   Left Mouse on a Course: Choose   |   "
-    "Left Mouse, Enter: Confirm   |   Esc, Right Mouse: Cancel"
+    "Wheel, Arrow Keys, Shift Enter: Change   |   Click on a Course: Choose   |   "
+    "Enter, Left Mouse: Confirm   |   Esc, Right Mouse: Cancel"
 )
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws the courses among which the user chooses, each with its energy, over the 3D viewports.
 
-The chosen course is drawn like a curve that is being changed (`overlay.show_dragged`), the others
-as thin lines below it.
+The chosen course is drawn like a curve that is being changed (`overlay.show_dragged`), here once
+more above the others, which are thin lines.
 """
 
 from __future__ import annotations
@@ -58,6 +58,11 @@ def show(opened: Opened, courses: list[Course], lines: list[np.ndarray], chosen:
     redraw()
 
 
+def is_shown() -> bool:
+    """Whether courses are drawn."""
+    return _state.shown is not None
+
+
 def hide() -> None:
     """Draw the active curve again instead of courses."""
     _state.shown, _state.places_of = None, ()
@@ -83,11 +88,11 @@ def _draw_lines() -> None:
     nearer = overlay.towards_the_eye(
         context.region_data, mesh_object, shown.opened.surface, overlay.radius_of(shown.opened)
     )
-    colour = overlay.Colours(context).point
-    for number, line in enumerate(shown.lines):
+    colours, batches = overlay.Colours(context), list(map(overlay.batch_of_line, shown.lines))
+    for number, batch in enumerate(batches):
         if number != shown.chosen:
-            batch = overlay.batch_of_line(line)
-            overlay.draw_line(context, nearer, batch, colour, THIN)
+            overlay.draw_line(context, nearer, batch, colours.point, THIN)
+    overlay.draw_line(context, nearer, batches[shown.chosen], colours.line)
 
 
 def _draw_labels() -> None:

@@ -7,7 +7,7 @@ from ..operators import curve_settings
 from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
 from ..scene import mesh_data
-from . import modes
+from . import course_overlay, modes
 from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
 from .point_operators import NICMM_OT_end_curve
@@ -99,7 +99,7 @@ TOOLS = (NICMM_WT_object, NICMM_WT_sculpt, NICMM_WT_weights)
 
 def draw_hints(header: bpy.types.Header, context: bpy.types.Context) -> None:
     """Draw the tool's mouse buttons and keys at the start of the status bar."""
-    if not modes.is_tool_active(context):
+    if not modes.is_tool_active(context) or course_overlay.is_shown():
         return
     row = header.layout.row(align=False)
     for icons, text in HINTS:

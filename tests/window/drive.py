@@ -568,7 +568,7 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 5, f"five items in {name}")
+        check(len(items) == 7, f"seven items in {name}")
         check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
     for config in ("Industry_Compatible", "Blender"):
         step(f"The keymap {config}")
@@ -604,6 +604,53 @@ def keys(blender: Blender) -> None:
     check(blender.do(f"value = {rotation}") != turned, "the view is turned")
     check(state(blender) == before, "no point is added")
     blender.do("bpy.context.preferences.inputs.use_mouse_emulate_3_button = False")
+
+
+def courses(blender: Blender) -> None:
+    """Choose Course: the preview, with keys, wheel and mouse; cancel and undo."""
+    step("Five points, and Choose Course with Shift Enter")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
+    before = state(blender)
+    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    blender.move(beside)
+    begin_choice(blender)
+    blender.shot("18-choose-course")
+    count = blender.do("value = helper.courses()['count']")
+    check(count > 1, "several courses")
+
+    step("Wheel, arrow keys and Shift Enter change the choice; Esc cancels")
+    blender.mouse("click", 5)
+    blender.wait("helper.courses()['chosen'] == 1", "the wheel")
+    blender.key("Down")
+    blender.wait(f"helper.courses()['chosen'] == {2 % count}", "an arrow key")
+    blender.key("Up")
+    blender.wait("helper.courses()['chosen'] == 1", "an arrow key back")
+    blender.shot("18-second-course")
+    check(state(blender) == before, "nothing changes during the choice")
+    blender.key("Escape")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    check(state(blender) == before, "Esc changes nothing")
+
+    step("A click chooses a course; Enter confirms; one undo step")
+    begin_choice(blender)
+    (label,) = blender.do("value = [helper.label_place(1)]")
+    blender.click(label)
+    blender.wait("helper.courses()['chosen'] == 1", "the course under the mouse")
+    blender.key("Return")
+    blender.wait(f"helper.state() != {before!r}", "the chosen course")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    count_points(blender, len(PLACES))
+    blender.shot("18-chosen-course")
+    undo_and_redo(blender, [before, state(blender)], "of the choice")
+
+
+def begin_choice(blender: Blender) -> None:
+    blender.key("shift+Return")
+    blender.wait("helper.courses() is not None", "the courses")
 
 
 def large(blender: Blender) -> None:
@@ -771,6 +818,7 @@ PARTS = {
     "methods": methods,
     "convert": convert,
     "keys": keys,
+    "courses": courses,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

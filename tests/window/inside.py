@@ -308,6 +308,19 @@ class Helper:
         return hashlib.sha1(repr(found).encode()).hexdigest()
 
     @staticmethod
+    def courses():
+        """The number of courses among which the user chooses, and the chosen one; or None."""
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        return shown and {"count": len(shown.courses), "chosen": shown.chosen}
+
+    @classmethod
+    def label_place(cls, number):
+        """Pixel of the screen on a course, beside its label."""
+        overlay = import_module(f"{MODULE}.tool.course_overlay")
+        region, place = cls.region(), overlay._state.places[number].tolist()
+        return [region.x + place[0], bpy.context.window.height - 1 - (region.y + place[1])]
+
+    @staticmethod
     def keymap(name):
         """Choose a keymap of Blender's."""
         bpy.utils.keyconfig_set(bpy.utils.preset_find(name, "keyconfig"))
