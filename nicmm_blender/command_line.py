@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
     bpy.ops.nicmm.design_curve(
         **{name: value for name, value in chosen.items() if value is not None},
         **_points(options),
+        **({} if options.via_points is None else {"via_points": options.via_points}),
     )
     bpy.ops.wm.save_as_mainfile(filepath=str(target), copy=True, check_existing=False)
 
@@ -114,6 +115,12 @@ def parser() -> argparse.ArgumentParser:
         "--points",
         metavar="A,B,C",
         help='vertex indices from 0, or positions in local space: "0.5 0 1, 0 0 2, 41"',
+    )
+    command_parser.add_argument(
+        "--via-points",
+        metavar="LEG:A,B;…",
+        help='via points for each leg, such as "1: 57, 63; 2: 0.5 0 1"; legs have the indices of '
+        "the control points at which they begin",
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = command_parser.add_argument_group("settings", "The same as in the sidebar.")

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
-Key = tuple[str, bytes, bytes]
+Key = tuple[str, tuple[bytes, ...]]
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,10 @@ def no_other_course(opened: Opened) -> str:
 
 def _key(opened: Opened) -> Key:
     """Everything that the courses of a curve depend on."""
-    points = opened.points
+    points, via = opened.points, opened.via
     on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
-    return on, points.faces.tobytes(), points.barycentric.tobytes()
+    arrays = points.faces, points.barycentric, via.legs, via.points.faces, via.points.barycentric
+    return on, tuple(each.tobytes() for each in arrays)
 
 
 @persistent

@@ -19,6 +19,7 @@ from ..scene.design_request import DesignRequest
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
+from ..scene.via_points import ViaPoints, leg_before, no_via_points, number_of_legs
 from . import curve_object, writing
 from .writing import ObjectSettings
 
@@ -46,6 +47,8 @@ class Opened:
         Settings of the curve.
     points : SurfacePoints of the core
         Control points on the surface.
+    via : ViaPoints
+        Via points on the surface.
     curve : SurfaceCurve of the core, or None
         The recorded curve; None if the curve is new or has to be designed again.
     remark : str
@@ -57,6 +60,7 @@ class Opened:
     surface: Surface
     settings: CurveSettings
     points: SurfacePoints
+    via: ViaPoints
     curve: SurfaceCurve | None
     remark: str
 
@@ -76,6 +80,10 @@ class Opened:
     def positions(self) -> np.ndarray:
         """Positions of the control points in the object's local space, (k, 3)."""
         return self.surface.points(self.points.faces, self.points.barycentric)
+
+    def via_positions(self) -> np.ndarray:
+        """Positions of the via points in the object's local space, (m, 3)."""
+        return self.surface.points(self.via.points.faces, self.via.points.barycentric)
 
     def polyline(self) -> np.ndarray:
         """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
@@ -166,8 +174,9 @@ def open_curve(
             settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    curve = None
+    via, curve = no_via_points(), None
     if edited is not None:
+        via = curve_record.current_via_points(edited, mesh_object, surface)
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
         if moved:
             points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
@@ -180,7 +189,7 @@ def open_curve(
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
-    return Opened(uid, mesh_object.session_uid, surface, settings, points, curve, remark)
+    return Opened(uid, mesh_object.session_uid, surface, settings, points, via, curve, remark)
 
 
 def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
@@ -188,7 +197,9 @@ def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
     if len(points) < FEWEST_OPEN:
         return []
     settings = replace(edited.settings, method="ELASTIC")
-    found = design_request.for_drawing(edited.mesh_object, edited.surface, points, settings)
+    found = design_request.for_drawing(
+        edited.mesh_object, edited.surface, points, edited.via, settings
+    )
     return [replace(found, start=edited.curve)]
 
 
@@ -246,8 +257,9 @@ def _record(
     drawn: Drawn | None,
 ) -> None:
     curve_settings = replace(edited.settings, method="ELASTIC")
+    via = edited.via.fitting(len(points), curve_settings.closed)
     curve_record.write_record(
-        result, mesh_object, edited.surface, curves, curve_settings, drawn, points
+        result, mesh_object, edited.surface, curves, curve_settings, drawn, points, via
     )
 
 
@@ -272,24 +284,41 @@ def nearest_surface_points(edited: Opened, positions: np.ndarray) -> SurfacePoin
     return nearest_points(mesh, positions @ surface.local_to_core.T)[0]
 
 
-def with_point(
-    points: SurfacePoints, number: int, place: SurfacePoints, replaced: bool = False
-) -> SurfacePoints:
-    """Points with the single point `place` inserted at an index, or replacing the point there."""
-    from ... import nicmm_core as nicmm
-
-    rest = points
-    if replaced:
-        rest = points[np.delete(np.arange(len(points)), number)]
-    return nicmm.SurfacePoints(
-        np.insert(rest.faces, number, place.faces[0]),
-        np.insert(rest.barycentric, number, place.barycentric[0], axis=0),
-    )
+def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> ViaPoints:
+    """The via points after the control point `place` has been inserted at an index."""
+    count, closed = len(edited.points), edited.settings.closed
+    leg = leg_before(number, count, closed)
+    via = edited.via
+    divided, is_behind = via.legs == leg, np.zeros(len(via), dtype=bool)
+    if divided.any():
+        along = _along_leg(edited, leg, via.points[divided])
+        is_behind[divided] = along >= _along_leg(edited, leg, place)
+    return via.after_insertion(number, count, closed, is_behind)
 
 
-def without_point(points: SurfacePoints, number: int) -> SurfacePoints:
-    """Points without the one at an index."""
-    return points[np.delete(np.arange(len(points)), number)]
+def checked_leg(edited: Opened, leg: int) -> int:
+    """The index of a leg; an error if the curve has no such leg."""
+    count = number_of_legs(len(edited.points), edited.settings.closed)
+    if not 0 <= leg < count:
+        raise InputError(f"There is no leg {leg}; the curve has {count}, counted from 0")
+    return leg
+
+
+def index_of_new_via(edited: Opened, leg: int, place: SurfacePoints) -> int:
+    """The index among the via points of one that is added to a leg, by its position there."""
+    via = edited.via
+    earlier = _along_leg(edited, leg, via.points[via.legs == leg]) < _along_leg(edited, leg, place)
+    return int((via.legs < leg).sum() + earlier.sum())
+
+
+def _along_leg(edited: Opened, leg: int, points: SurfacePoints) -> np.ndarray:
+    """How far along a leg of the curve points are, (k,); 0 without a curve."""
+    from ...nicmm_core.geometry.curve import along_leg
+
+    if edited.curve is None:
+        return np.zeros(len(points))
+    mesh = surface_cache.core_mesh(edited.surface)
+    return along_leg(edited.curve, leg, points.positions(mesh))
 
 
 def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:

@@ -16,6 +16,7 @@ from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.surface import Surface
+from ..scene.via_points import ViaPoints
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
@@ -82,15 +83,17 @@ def apply(
     curves: list[SurfaceCurve],
     settings: OutputSettings,
     curve_settings: CurveSettings,
+    via: ViaPoints | None = None,
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
-    `settings` holds the output settings, `curve_settings` the settings of the curves.
+    `settings` holds the output settings, `curve_settings` the settings of the curves, and `via`
+    their via points.
     """
     if settings.output in SEPARATE:
         new_object = as_object(mesh_object, surface, curves, settings)
         curve_record.write_record(
-            new_object, mesh_object, surface, curves, curve_settings, drawn_as(settings)
+            new_object, mesh_object, surface, curves, curve_settings, drawn_as(settings), via=via
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
@@ -215,6 +218,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         answer.curves,
         request.settings,
         curve_record.drawn_as(designed),
+        via=request.via,
     )
 
 

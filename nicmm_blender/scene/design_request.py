@@ -20,6 +20,7 @@ from .curve_record import CurveSettings
 from .lookup import by_uid
 from .messages import InputError, user_message
 from .surface import Surface, group_weights, read
+from .via_points import ViaPoints
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
@@ -33,8 +34,9 @@ if TYPE_CHECKING:
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points`, `options` and `start` are arguments for the core. `moved` counts the control points
-    that were moved to the nearest point of the surface because their triangles no longer exist.
+    `points`, `options` and `start` are arguments for the core; `options` has the via points, too.
+    `moved` counts the control points that were moved to the nearest point of the surface because
+    their triangles no longer exist.
     """
 
     mesh_name: str
@@ -44,6 +46,7 @@ class DesignRequest:
     order: str
     settings: CurveSettings
     options: dict[str, Any]
+    via: ViaPoints | None = None
     start: Design | SurfaceCurve | None = None
     moved: int = 0
 
@@ -112,12 +115,24 @@ def for_points(
 
 
 def for_drawing(
-    mesh_object: bpy.types.Object, surface: Surface, points: SurfacePoints, settings: CurveSettings
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    points: SurfacePoints,
+    via: ViaPoints,
+    settings: CurveSettings,
 ) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
     request = for_points(mesh_object, surface, points, "given", settings)
     closed = settings.closed and len(points) >= FEWEST_CLOSED
-    return replace(request, options={**request.options, "closed": closed})
+    found = replace(request, options={**request.options, "closed": closed})
+    return with_via_points(found, via.fitting(len(points), closed))
+
+
+def with_via_points(request: DesignRequest, via: ViaPoints) -> DesignRequest:
+    """A request with via points; they need the order "given"."""
+    if not len(via):
+        return request
+    return replace(request, via=via, options={**request.options, "via_points": via.by_leg()})
 
 
 def for_curve(
@@ -130,7 +145,8 @@ def for_curve(
     points, moved = curve_record.current_control_points(curve_object, mesh_object, surface)
     if len(points) < FEWEST_OPEN:
         raise InputError(curve_record.no_curve_message(curve_object))
-    request = for_drawing(mesh_object, surface, points, settings)
+    via = curve_record.current_via_points(curve_object, mesh_object, surface)
+    request = for_drawing(mesh_object, surface, points, via, settings)
     start = None
     if settings.method == "ELASTIC" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)

@@ -54,7 +54,7 @@ _state = _State()
 def show(opened: Opened, courses: list[Course], lines: list[np.ndarray], chosen: int) -> None:
     """Draw courses, whose lines are in the local space of the mesh."""
     _state.shown = _Shown(opened, courses, lines, chosen)
-    overlay.show_dragged(opened, opened.points, courses[chosen].curve)
+    overlay.show_dragged(opened, courses[chosen].curve)
     redraw()
 
 

@@ -27,7 +27,7 @@ from .picking import Kind
 from .view import OFFSET, View
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ...nicmm_core import SurfaceCurve
 
 Colour = tuple[float, ...]
 """Red, green and blue, and possibly opacity."""
@@ -35,11 +35,11 @@ Colour = tuple[float, ...]
 HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
-LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
+LINE_WIDTH, POINT_RADIUS, HOLE_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 3.0, 1.5
 """Sizes in pixels at a resolution scale of 1."""
 
 CORNERS = 20
-"""Number of corners of the disc that shows a point."""
+"""Number of corners of the disc that shows a control point, and of the ring of a via point."""
 
 OUTLINE = (0.05, 0.05, 0.05)
 """Dark colour under every line and point, so that they stand out from any theme colour."""
@@ -47,11 +47,12 @@ OUTLINE = (0.05, 0.05, 0.05)
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Points, (k, 3), and line, (n, 3), in the local space of a mesh object."""
+    """Points, (k, 3), via points, (m, 3), and line, (n, 3), in the local space of a mesh object."""
 
     mesh_uid: int
     surface: Surface
     points: np.ndarray
+    via: np.ndarray
     line: np.ndarray
     problem: str = ""
     radius: float = 0.0
@@ -77,18 +78,17 @@ class _State:
 _state = _State()
 
 
-def show_dragged(
-    opened: Opened, points: SurfacePoints, curve: SurfaceCurve | None, problem: str = ""
-) -> None:
-    """Draw a curve that is being changed instead of the active one."""
+def show_dragged(edited: Opened, curve: SurfaceCurve | None, problem: str = "") -> None:
+    """Draw a curve that is being changed, with its changed points, instead of the active one."""
     _state.hover = None
     _state.dragged = _Drawn(
-        opened.mesh_uid,
-        opened.surface,
-        opened.surface.points(points.faces, points.barycentric),
-        edited_curve.polyline_of(opened.surface, curve),
+        edited.mesh_uid,
+        edited.surface,
+        edited.positions(),
+        edited.via_positions(),
+        edited_curve.polyline_of(edited.surface, curve),
         problem,
-        radius_of(opened),
+        radius_of(edited),
     )
 
 
@@ -126,8 +126,15 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
-    points, line = opened.positions(), opened.polyline()
-    return _Drawn(opened.mesh_uid, opened.surface, points, line, "", radius_of(opened))
+    return _Drawn(
+        opened.mesh_uid,
+        opened.surface,
+        opened.positions(),
+        opened.via_positions(),
+        opened.polyline(),
+        "",
+        radius_of(opened),
+    )
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
@@ -210,12 +217,14 @@ def _draw_points() -> None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)
     colours = Colours(context)
-    positions, marked = drawn.points, -1
-    fills = [colours.point] * len(positions)
+    positions, marked = np.concatenate([drawn.points, drawn.via]), -1
+    fills, n_points = [colours.point] * len(positions), len(drawn.points)
     hit = _hover_on(drawn)
     if hit is not None:
-        if hit.kind is Kind.POINT and hit.index < len(positions):
+        if hit.kind is Kind.POINT and hit.index < n_points:
             fills[hit.index] = colours.hover
+        elif hit.kind is Kind.VIA and hit.index < len(drawn.via):
+            fills[n_points + hit.index] = colours.hover
         elif hit.kind in {Kind.LINE, Kind.SURFACE}:
             marked = len(positions)
             positions = np.concatenate([positions, [hit.position]])
@@ -229,12 +238,13 @@ def _draw_points() -> None:
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
         opacity = 1.0 if visible[number] else HIDDEN
         size = 0.6 if number == marked else 1.0  # smaller where a click would add a point
-        for radius, colour in (
-            (POINT_RADIUS + OUTLINE_WIDTH, OUTLINE),
-            (POINT_RADIUS, fills[number]),
+        is_ring = n_points <= number != marked
+        for shape, colour in (
+            (_OUTLINED_RING if is_ring else _OUTLINED_DISC, OUTLINE),
+            (_RING if is_ring else _DISC, fills[number]),
         ):
-            corners.append(centres[number] + size * scale * radius * _DISC)
-            colour_of.append(np.tile((*colour[:3], opacity), (len(_DISC), 1)))
+            corners.append(centres[number] + size * scale * shape)
+            colour_of.append(np.tile((*colour[:3], opacity), (len(shape), 1)))
     if not corners:
         return
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
@@ -269,14 +279,18 @@ class Colours:
         self.hover, self.problem = tuple(theme.gizmo_primary), tuple(theme.axis_x)
 
 
-def _disc() -> np.ndarray:
-    """Triangles of a disc of radius 1, as consecutive corners, (n, 2)."""
+def _ring(inner: float, outer: float) -> np.ndarray:
+    """Triangles between two circles around the origin, as consecutive corners, (n, 2)."""
     angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
     rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return np.stack([np.zeros((CORNERS, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
+    (a, b), (c, d) = ((radius * rim[:-1], radius * rim[1:]) for radius in (inner, outer))
+    return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
 
 
-_DISC = _disc()
+_DISC = _ring(0.0, POINT_RADIUS)
+_OUTLINED_DISC = _ring(0.0, POINT_RADIUS + OUTLINE_WIDTH)
+_RING = _ring(HOLE_RADIUS, POINT_RADIUS)
+_OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, POINT_RADIUS + OUTLINE_WIDTH)
 
 
 def towards_the_eye(

@@ -22,6 +22,11 @@ KEYMAP = (
         {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
         {"properties": [("remove", True)]},
     ),
+    (
+        NICMM_OT_draw_on_surface.bl_idname,
+        {"type": "LEFTMOUSE", "value": "PRESS", "shift": True},
+        {"properties": [("via", True)]},
+    ),
     (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
@@ -41,6 +46,7 @@ HINTS = (
     (("MOUSE_LMB",), "Add or Insert Point"),
     (("MOUSE_LMB_DRAG",), "Move Point"),
     (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
+    (("EVENT_SHIFT", "MOUSE_LMB_DRAG"), "Via Point on Curve"),
     (("EVENT_RETURN",), "End Curve"),
     (("EVENT_SHIFT", "EVENT_RETURN"), "Choose Course"),
 )

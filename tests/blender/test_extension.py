@@ -142,7 +142,7 @@ def test_methods_keep_the_numbers_that_files_store(extension):
 def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
-    of_scripts = {"points", "point_group"}
+    of_scripts = {"points", "point_group", "via_points"}
     assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
 
 
