@@ -247,7 +247,10 @@ class Improvement:
         return self.energies.index(min(self.energies))
 
     def relative_energies(self) -> list[float]:
-        """Energies relative to that of the best curve, which is taken without maps."""
+        """Energies relative to that of the best curve, all at least 1.
+
+        Differences are divided by its energy without maps, since with lanes it may be negative.
+        """
         energies, best = self.energies, self.best
         unit = self._elastic_energy(self.curves[best])
         return [1.0 + (energy - energies[best]) / unit for energy in energies]

@@ -35,7 +35,8 @@ Colour = tuple[float, ...]
 HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
-LINE_WIDTH, POINT_RADIUS, HOLE_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 3.0, 1.5
+LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
+RING_RADIUS, HOLE_RADIUS = 6.5, 4.5
 """Sizes in pixels at a resolution scale of 1."""
 
 CORNERS = 20
@@ -289,8 +290,8 @@ def _ring(inner: float, outer: float) -> np.ndarray:
 
 _DISC = _ring(0.0, POINT_RADIUS)
 _OUTLINED_DISC = _ring(0.0, POINT_RADIUS + OUTLINE_WIDTH)
-_RING = _ring(HOLE_RADIUS, POINT_RADIUS)
-_OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, POINT_RADIUS + OUTLINE_WIDTH)
+_RING = _ring(HOLE_RADIUS, RING_RADIUS)
+_OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, RING_RADIUS + OUTLINE_WIDTH)
 
 
 def towards_the_eye(

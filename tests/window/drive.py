@@ -568,7 +568,7 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 7, f"seven items in {name}")
+        check(len(items) == 8, f"eight items in {name}")
         check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
     for config in ("Industry_Compatible", "Blender"):
         step(f"The keymap {config}")
@@ -646,6 +646,66 @@ def courses(blender: Blender) -> None:
     count_points(blender, len(PLACES))
     blender.shot("18-chosen-course")
     undo_and_redo(blender, [before, state(blender)], "of the choice")
+
+
+def via_points(blender: Blender) -> None:
+    """Via points: Shift-drag from the curve, drag one again, Ctrl-click; Esc and undo."""
+    step("Two points on an open curve; Shift-drag from the curve adds a via point")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do("bpy.context.scene.nicmm_curves.closed = False")
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    ends = blender.do("value = helper.in_front([(-0.42, 0.62), (0.42, 0.62)])")
+    states = click_places(blender, ends)
+    plain = states[-1]
+    count = "len(helper.curve()['nicmm_curve'].get('via_legs', []))"
+    (on_curve,) = blender.do("value = helper.pixels([helper.line()[len(helper.line()) // 2]])")
+    shift_drag(blender, on_curve, 10, (0.0, 14.0), "19-via-dragged")
+    blender.mouse("mouseup", 1)
+    blender.mouse("keyup", "shift")
+    blender.wait(f"{count} == 1", "the via point")
+    blender.wait("not helper.is_modal()", "the curve near the via point")
+    count_points(blender, 2)
+    added = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("19-via-point")
+    step("Esc during a drag of the via point changes nothing; then drag it")
+    (ring,) = blender.do("value = helper.pixels(helper.via_places())")
+    drag(blender, ring, 10, (3.0, -6.0))
+    blender.key("Escape")
+    time.sleep(0.5)
+    blender.mouse("mouseup", 1)
+    time.sleep(0.5)
+    check(state(blender) == added, "Esc changes nothing")
+    drag(blender, ring, 10, (3.0, 3.0))
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {added!r}", "the moved via point")
+    blender.wait("not helper.is_modal()", "the curve near the via point")
+    moved = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("19-via-moved")
+    step("Ctrl-click removes it; undo and redo")
+    (ring,) = blender.do("value = helper.pixels(helper.via_places())")
+    blender.click(ring, "ctrl")
+    blender.wait(f"{count} == 0", "the via point is removed")
+    blender.wait("not helper.is_modal()", "the curve without it")
+    undo_and_redo(blender, [plain, added, moved, state(blender)], "of via points")
+    step("Shift-click beside the curve adds nothing")
+    before = state(blender)
+    (middle,) = blender.do("value = helper.pixels(helper.in_front([(0.0, -0.2)]))")
+    blender.click(middle, "shift")
+    time.sleep(1.0)
+    check(state(blender) == before, "no point is added")
+    blender.do("bpy.context.scene.nicmm_curves.closed = True")
+
+
+def shift_drag(blender: Blender, start, steps: int, each, name: str) -> None:
+    """Hold Shift and drag; both stay pressed."""
+    blender.move(start)
+    blender.mouse("keydown", "shift")
+    time.sleep(HOLD)
+    drag(blender, start, steps, each, name)
 
 
 def begin_choice(blender: Blender) -> None:
@@ -819,6 +879,7 @@ PARTS = {
     "convert": convert,
     "keys": keys,
     "courses": courses,
+    "via": via_points,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

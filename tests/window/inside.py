@@ -288,6 +288,11 @@ class Helper:
         return np.array(cls.curve()["nicmm_curve"]["control_positions"]).reshape(-1, 3).tolist()
 
     @classmethod
+    def via_places(cls):
+        """Via points of the active curve in the mesh's local space."""
+        return np.array(cls.curve()["nicmm_curve"]["via_positions"]).reshape(-1, 3).tolist()
+
+    @classmethod
     def line(cls):
         """Points of the active curve object."""
         splines = cls.curve().data.splines
