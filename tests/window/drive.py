@@ -618,18 +618,24 @@ def courses(blender: Blender) -> None:
     beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
     blender.move(beside)
     begin_choice(blender)
-    blender.shot("18-choose-course")
-    count = blender.do("value = helper.courses()['count']")
+    blender.shot("18-courses")
+    count, first = blender.do("value = helper.courses()")
     check(count > 1, "several courses")
+
+    def wait_for(number: int, why: str) -> None:
+        blender.wait(f"helper.courses() == [{count}, {number % count}]", why)
 
     step("Wheel, arrow keys and Shift Enter change the choice; Esc cancels")
     blender.mouse("click", 5)
-    blender.wait("helper.courses()['chosen'] == 1", "the wheel")
+    wait_for(first + 1, "the wheel")
     blender.key("Down")
-    blender.wait(f"helper.courses()['chosen'] == {2 % count}", "an arrow key")
-    blender.key("Up")
-    blender.wait("helper.courses()['chosen'] == 1", "an arrow key back")
-    blender.shot("18-second-course")
+    wait_for(first + 2, "an arrow key")
+    blender.key("shift+Return")
+    wait_for(first + 3, "Shift Enter")
+    for step_back in (2, 1):
+        blender.key("Up")
+        wait_for(first + step_back, "an arrow key back")
+    blender.shot("4-choose-course")
     check(state(blender) == before, "nothing changes during the choice")
     blender.key("Escape")
     blender.wait("not helper.is_modal()", "the end of the choice")
@@ -637,9 +643,9 @@ def courses(blender: Blender) -> None:
 
     step("A click chooses a course; Enter confirms; one undo step")
     begin_choice(blender)
-    (label,) = blender.do("value = [helper.label_place(1)]")
-    blender.click(label)
-    blender.wait("helper.courses()['chosen'] == 1", "the course under the mouse")
+    other, pixel = blender.do("value = helper.another_course()")
+    blender.click(pixel)
+    wait_for(other, "the course under the mouse")
     blender.key("Return")
     blender.wait(f"helper.state() != {before!r}", "the chosen course")
     blender.wait("not helper.is_modal()", "the end of the choice")
@@ -661,7 +667,8 @@ def via_points(blender: Blender) -> None:
     plain = states[-1]
     count = "len(helper.curve()['nicmm_curve'].get('via_legs', []))"
     (on_curve,) = blender.do("value = helper.pixels([helper.line()[len(helper.line()) // 2]])")
-    shift_drag(blender, on_curve, 10, (0.0, 14.0), "19-via-dragged")
+    muzzle, mouth = blender.do("value = helper.pixels(helper.in_front([(0, -0.45), (0, -0.75)]))")
+    shift_drag(blender, on_curve, 10, part_of_way(on_curve, muzzle, 10), "19-via-dragged")
     blender.mouse("mouseup", 1)
     blender.mouse("keyup", "shift")
     blender.wait(f"{count} == 1", "the via point")
@@ -678,13 +685,13 @@ def via_points(blender: Blender) -> None:
     blender.mouse("mouseup", 1)
     time.sleep(0.5)
     check(state(blender) == added, "Esc changes nothing")
-    drag(blender, ring, 10, (3.0, 3.0))
+    drag(blender, ring, 10, part_of_way(ring, mouth, 10))
     blender.mouse("mouseup", 1)
     blender.wait(f"helper.state() != {added!r}", "the moved via point")
     blender.wait("not helper.is_modal()", "the curve near the via point")
     moved = state(blender)
     blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
-    blender.shot("19-via-moved")
+    blender.shot("4-via-point")
     step("Ctrl-click removes it; undo and redo")
     (ring,) = blender.do("value = helper.pixels(helper.via_places())")
     blender.click(ring, "ctrl")
@@ -706,6 +713,11 @@ def shift_drag(blender: Blender, start, steps: int, each, name: str) -> None:
     blender.mouse("keydown", "shift")
     time.sleep(HOLD)
     drag(blender, start, steps, each, name)
+
+
+def part_of_way(start, end, steps: int) -> tuple[float, float]:
+    """One of equal steps from a pixel to another."""
+    return (end[0] - start[0]) / steps, (end[1] - start[1]) / steps
 
 
 def begin_choice(blender: Blender) -> None:

@@ -316,14 +316,31 @@ class Helper:
     def courses():
         """The number of courses among which the user chooses, and the chosen one; or None."""
         shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
-        return shown and {"count": len(shown.courses), "chosen": shown.chosen}
+        return shown and [len(shown.courses), shown.chosen]
 
     @classmethod
-    def label_place(cls, number):
-        """Pixel of the screen on a course, beside its label."""
-        overlay = import_module(f"{MODULE}.tool.course_overlay")
-        region, place = cls.region(), overlay._state.places[number].tolist()
-        return [region.x + place[0], bpy.context.window.height - 1 - (region.y + place[1])]
+    def another_course(cls):
+        """A course that is not chosen, and a pixel of the screen where a click chooses it.
+
+        Of courses that share a leg, a click chooses the fairest.
+        """
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        region, opened = cls.region(), shown.opened
+        with cls.in_view():
+            picking = import_module(f"{MODULE}.tool.picking")
+            view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
+        for line in shown.lines:
+            for pixel in np.round(view.project(line[view.visible(line)])):
+                under = [
+                    each
+                    for each, other in enumerate(shown.lines)
+                    if view.nearest_on_line(pixel, other, 2.0 * picking.CURVE_REACH) is not None
+                ]
+                if under and shown.chosen not in under:
+                    x, y = pixel.tolist()
+                    place = [region.x + x, bpy.context.window.height - 1 - (region.y + y)]
+                    return min(under), place
+        raise ValueError("the chosen course is everywhere")
 
     @staticmethod
     def keymap(name):
