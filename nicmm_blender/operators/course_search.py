@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.props import IntProperty
 
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
@@ -28,7 +29,20 @@ if TYPE_CHECKING:
 ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
-Key = tuple[str, tuple[bytes, ...]]
+WHOLE = -1
+"""Number that means the whole curve instead of one of its legs."""
+
+LEG = IntProperty(
+    name="Leg",
+    description="Index of the control point at which the leg begins whose course changes, or -1 "
+    "for the whole curve",
+    default=WHOLE,
+    min=WHOLE,
+    options={"SKIP_SAVE"},
+)
+"""The property of operators that names a leg."""
+
+Key = tuple[str, int, tuple[bytes, ...]]
 
 
 @dataclass(frozen=True)
@@ -53,11 +67,14 @@ _found: dict[Key, list[Course]] = {}
 class CourseSearch(LongSolves):
     """A mixin for operators with `use_courses(context, opened, courses)`.
 
-    It searches for the courses of a curve, the fairest first, unless they are known.
+    It searches for the courses of a curve, or of one of its legs, the fairest first, unless they
+    are known.
     """
 
     curve: str
-    """Property of the operators: the name of the curve."""
+    leg: int
+    """Properties of the operators: the name of the curve, and the leg, or -1 for the whole curve.
+    """
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -76,12 +93,16 @@ class CourseSearch(LongSolves):
             raise InputError(polls.NO_CURVE)
         if not curve_record.has_curve(edited):
             raise InputError(curve_record.no_curve_message(edited))
-        self._opened = edited_curve.open_curve(context, edited)
-        self._key = _key(self._opened)
+        self._opened = opened = edited_curve.open_curve(context, edited)
+        if self.leg != WHOLE:
+            self._opened = opened = _without_via_points(opened, self.leg)
+        self._key = _key(opened, self.leg)
         if self._key in _found:
             return []
-        (request,) = edited_curve.request(self._opened, self._opened.points)
+        (request,) = edited_curve.request(opened, opened.points)
         options = {**request.options, "alternatives": ALTERNATIVES}
+        if self.leg != WHOLE:
+            return [replace(request, leg=self.leg, options=options)]
         return [replace(request, start=None, options=options)]
 
     def finish(
@@ -117,12 +138,25 @@ def no_other_course(opened: Opened) -> str:
     return f'No other course of "{opened.curve_object.name}" was found'
 
 
-def _key(opened: Opened) -> Key:
-    """Everything that the courses of a curve depend on."""
+def _without_via_points(opened: Opened, leg: int) -> Opened:
+    """A curve without the via points of a leg for which another course is sought."""
+    edited_curve.checked_leg(opened, leg)
+    if opened.curve is None:
+        raise InputError(
+            f'The surface has changed since "{opened.curve_object.name}" was designed. Run Update '
+            "Curves first"
+        )
+    return replace(opened, via=opened.via.without_leg(leg))
+
+
+def _key(opened: Opened, leg: int) -> Key:
+    """Everything that the courses of a curve, or of one of its legs, depend on."""
     points, via = opened.points, opened.via
     on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
     arrays = points.faces, points.barycentric, via.legs, via.points.faces, via.points.barycentric
-    return on, tuple(each.tobytes() for each in arrays)
+    if leg != WHOLE and opened.curve is not None:  # the other legs keep their courses
+        arrays = *arrays, opened.curve.faces, opened.curve.barycentric
+    return on, leg, tuple(each.tobytes() for each in arrays)
 
 
 @persistent

@@ -9,17 +9,18 @@ from ..outputs.edited_curve import Opened
 from ..scene.design_request import DesignRequest
 from ..settings import CURVE
 from . import course_search
-from .course_search import ALTERNATIVES, Course, CourseSearch
+from .course_search import ALTERNATIVES, LEG, Course, CourseSearch
 
 
 class NICMM_OT_next_course(CourseSearch, bpy.types.Operator):
-    """Design the curve along another course through its control points"""
+    """Design the curve, or one of its legs, along another course"""
 
     bl_idname = "nicmm.next_course"
     bl_label = "Next Course"
     bl_options = {"REGISTER", "UNDO"}
 
     curve: CURVE
+    leg: LEG
     course: IntProperty(
         name="Course",
         description="Number of the course: 1 for the fairest, 2 for the second fairest, and so on. "

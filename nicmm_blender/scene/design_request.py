@@ -23,7 +23,7 @@ from .surface import Surface, group_weights, read
 from .via_points import ViaPoints
 
 if TYPE_CHECKING:
-    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core import Design, Designer, SurfaceCurve, SurfacePoints
     from ...nicmm_core.progress import Progress
 
     Answer = Design | Exception
@@ -35,8 +35,9 @@ class DesignRequest:
     """Everything that a curve depends on.
 
     `points`, `options` and `start` are arguments for the core; `options` has the via points, too.
-    `moved` counts the control points that were moved to the nearest point of the surface because
-    their triangles no longer exist.
+    With a `leg`, only other courses of this leg of the start are sought. `moved` counts the control
+    points that were moved to the nearest point of the surface because their triangles no longer
+    exist.
     """
 
     mesh_name: str
@@ -48,6 +49,7 @@ class DesignRequest:
     options: dict[str, Any]
     via: ViaPoints | None = None
     start: Design | SurfaceCurve | None = None
+    leg: int | None = None
     moved: int = 0
 
     def mesh_object(self) -> bpy.types.Object | None:
@@ -164,6 +166,8 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
             design = None
+            if request.leg is not None:
+                return _leg_courses(designer, request, progress)
             if request.start is not None:
                 # If the curve cannot keep its course, the core searches for a new one below.
                 with contextlib.suppress(nicmm.CurveError):
@@ -176,3 +180,12 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
             vertices = request.points if isinstance(request.points, np.ndarray) else None
             at = vertices if vertices is not None and vertices.ndim == 1 else None
             raise InputError(user_message(error, settings.obstacle_group, at)) from error
+
+
+def _leg_courses(designer: Designer, request: DesignRequest, progress: Progress) -> Design:
+    """The courses that one leg of a curve can take; the curve is the start of the request."""
+    from ...nicmm_core.leg_courses import leg_courses
+
+    return leg_courses(
+        designer, request.points, request.start, request.leg, progress=progress, **request.options
+    )

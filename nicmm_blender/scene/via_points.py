@@ -45,6 +45,10 @@ class ViaPoints:
         """Those whose leg exists on a curve through `count` points."""
         return self._subset(np.flatnonzero(self.legs < number_of_legs(count, closed)))
 
+    def without_leg(self, leg: int) -> ViaPoints:
+        """Without those of one leg."""
+        return self._subset(np.flatnonzero(self.legs != leg))
+
     def inserted(self, number: int, leg: int, place: SurfacePoints) -> ViaPoints:
         """With another via point, which gets an index among them."""
         return ViaPoints(np.insert(self.legs, number, leg), with_point(self.points, number, place))

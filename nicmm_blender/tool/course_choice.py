@@ -7,13 +7,14 @@ import bpy
 import numpy as np
 
 from ..operators import course_search
-from ..operators.course_search import Course, CourseSearch
+from ..operators.course_search import LEG, Course, CourseSearch
 from ..operators.error_reports import called, with_error_reports
 from ..outputs.edited_curve import Opened
 from ..scene.messages import InputError
 from ..scene.viewports import NAVIGATION
 from ..settings import CURVE
 from . import course_overlay, picking
+from .picking import Kind
 
 NEXT = {"WHEELDOWNMOUSE", "DOWN_ARROW", "RIGHT_ARROW"}
 PREVIOUS = {"WHEELUPMOUSE", "UP_ARROW", "LEFT_ARROW"}
@@ -28,6 +29,9 @@ HINT = (
 class CourseChoice(CourseSearch):
     """A mixin for operators that show the courses found and end with a call for the chosen one."""
 
+    under_mouse: bool
+    """Property of the operators: whether the courses are those of the leg under the mouse."""
+
     _is_choosing = False
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
@@ -39,7 +43,15 @@ class CourseChoice(CourseSearch):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not picking.is_view(context):
             return {"PASS_THROUGH"}
-        return super().invoke(context, event)
+        return with_error_reports(self, lambda: self._invoke(context, event))
+
+    def _invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.under_mouse:
+            hit = picking.under_mouse(context, picking.pixel_of(event))
+            if hit is None or hit.kind is not Kind.LINE:
+                raise InputError("Move the mouse over a leg of the active curve")
+            self.leg = hit.index - 1
+        return self.answer(context, self.requests(context))
 
     def use_courses(
         self, context: bpy.types.Context, opened: Opened, courses: list[Course]
@@ -134,6 +146,7 @@ class CourseChoice(CourseSearch):
             bpy.ops.nicmm.next_course,
             "EXEC_DEFAULT",
             curve=curve.name,
+            leg=self.leg,
             course=self._chosen + 1,
         )
 
@@ -148,13 +161,20 @@ def _has_modifier(event: bpy.types.Event) -> bool:
 
 
 class NICMM_OT_choose_course(CourseChoice, bpy.types.Operator):
-    """Show the courses that the curve can take through its points, and choose one of them"""
+    """Show the courses that the curve, or one of its legs, can take, and choose one of them"""
 
     bl_idname = "nicmm.choose_course"
     bl_label = "Choose Course"
     bl_options = {"INTERNAL"}
 
     curve: CURVE
+    leg: LEG
+    under_mouse: bpy.props.BoolProperty(
+        name="Leg under Mouse",
+        description="Show the courses of the leg under the mouse, while the other legs keep theirs",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
 
 
 def register() -> None:

@@ -30,11 +30,13 @@ KEYMAP = (
     (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
-    (NICMM_OT_choose_course.bl_idname, {"type": "RET", "value": "PRESS", "shift": True}, None),
-    (
-        NICMM_OT_choose_course.bl_idname,
-        {"type": "NUMPAD_ENTER", "value": "PRESS", "shift": True},
-        None,
+    *(
+        (NICMM_OT_choose_course.bl_idname, {"type": key, "value": "PRESS", **held}, values)
+        for key in ("RET", "NUMPAD_ENTER")
+        for held, values in (
+            ({"shift": True}, None),
+            ({"shift": True, "ctrl": True}, {"properties": [("under_mouse", True)]}),
+        )
     ),
 )
 """Mouse buttons and keys of the tool.
@@ -49,6 +51,7 @@ HINTS = (
     (("EVENT_SHIFT", "MOUSE_LMB_DRAG"), "Via Point on Curve"),
     (("EVENT_RETURN",), "End Curve"),
     (("EVENT_SHIFT", "EVENT_RETURN"), "Choose Course"),
+    (("EVENT_CTRL", "EVENT_SHIFT", "EVENT_RETURN"), "Choose Course of Leg"),
 )
 
 

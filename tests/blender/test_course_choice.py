@@ -8,7 +8,7 @@ import pytest
 
 from tests.blender.scenes import module
 from tests.blender.test_next_course import APART, away, curve, diagonal, line, torus
-from tests.blender.test_point_operators import call, content
+from tests.blender.test_point_operators import call, content, controls, refusal
 from tests.blender.test_view import matrices
 
 pytestmark = [pytest.mark.usefixtures("remembered_designs"), pytest.mark.slow]
@@ -46,7 +46,7 @@ def choice(empty_scene, monkeypatch):
     monkeypatch.setattr(picking, "view_on", seen_from_the_front)
 
     class Operator(course_choice.CourseChoice):
-        bl_label, curve = "Choose Course", ""
+        bl_label, curve, leg, under_mouse = "Choose Course", "", -1, False
 
         def report(self, kind, message):
             reports.append(message)
@@ -58,12 +58,24 @@ def choice(empty_scene, monkeypatch):
         place = {"mouse_region_x": pixel[0], "mouse_region_y": pixel[1]}
         return operator.modal(context, SimpleNamespace(type=kind, value=value, **held, **place))
 
-    def begin():
+    def begin(leg=-1):
+        operator.leg = leg
         return operator.answer(context, operator.requests(context))
+
+    def press(pixel, under_mouse=True):
+        operator.under_mouse = under_mouse
+        place = {"mouse_region_x": pixel[0], "mouse_region_y": pixel[1]}
+        return operator._invoke(context, SimpleNamespace(**place))
 
     overlay = module(empty_scene, "tool.course_overlay")
     yield SimpleNamespace(
-        operator=operator, context=context, send=send, begin=begin, reports=reports, overlay=overlay
+        operator=operator,
+        context=context,
+        send=send,
+        begin=begin,
+        press=press,
+        reports=reports,
+        overlay=overlay,
     )
     assert overlay._state.shown is None
 
@@ -175,3 +187,105 @@ def test_blender_can_end_the_choice(choice, curve):
 def test_scripts_are_referred_to_next_course(curve):
     with pytest.raises(RuntimeError, match="Scripts call next_course"):
         bpy.ops.nicmm.choose_course("EXEC_DEFAULT")
+
+
+# Another course of one leg.
+
+
+@pytest.fixture
+def loop(torus):
+    """A closed curve through four points around the torus, in turn on its top and its bottom."""
+    for number, angle in enumerate((0.1, 1.5, 2.8, 4.4)):
+        place = (1.1 * np.cos(angle), 1.1 * np.sin(angle), 0.3 * (-1) ** (number + 1))
+        call("add_point", position=torus.closest_point_on_mesh(place)[1])
+    return bpy.context.active_object
+
+
+def legs(curve):
+    """The parts of the curve between its control points, in the local space of the mesh."""
+    points = line(curve)
+    ends = [int(np.linalg.norm(points - place, axis=1).argmin()) for place in controls(curve)]
+    count = len(points)
+    return [
+        points[np.arange(first, last + count * (last <= first) + 1) % count]
+        for first, last in zip(ends, [*ends[1:], ends[0]], strict=True)
+    ]
+
+
+def changes(before, after):
+    return [away(*pair) for pair in zip(before, after, strict=True)]
+
+
+def test_one_leg_takes_another_course(loop):
+    loop, leg = leg_with_courses()
+    before, state = legs(loop), content()
+    call("next_course", leg=leg)
+    moved = changes(before, legs(loop))
+    assert moved[leg] == max(moved) > APART * diagonal(bpy.data.objects["Torus"])
+    after = content()
+    bpy.ops.ed.undo()
+    assert content() == state
+    bpy.ops.ed.redo()
+    assert content() == after
+
+
+def leg_with_courses():
+    """The active curve, and a leg of it that can take more than one course."""
+    for leg in range(4):
+        if bpy.ops.nicmm.next_course("EXEC_DEFAULT", True, leg=leg) == {"FINISHED"}:
+            bpy.ops.ed.undo()  # replaces Blender's Python objects
+            return bpy.context.active_object, leg
+    raise AssertionError("no leg has another course")
+
+
+def test_via_points_of_other_legs_are_kept(loop):
+    loop, leg = leg_with_courses()
+    for number in range(4):
+        points = legs(loop)[number]
+        call("add_via_point", leg=number, position=tuple(points[len(points) // 2]))
+    assert list(loop["nicmm_curve"]["via_legs"]) == [0, 1, 2, 3]
+    call("next_course", leg=leg)
+    kept = [number for number in range(4) if number != leg]
+    assert list(loop["nicmm_curve"]["via_legs"]) == kept
+
+
+def test_the_courses_of_a_leg_are_shown(choice, loop):
+    loop, leg = leg_with_courses()
+    before, state = legs(loop), content()
+    assert choice.begin(leg) == {"RUNNING_MODAL"}
+    shown = choice.overlay._state.shown
+    energies = [course.energy for course in shown.courses]
+    assert energies[0] == 1.0 and energies == sorted(energies) and len(energies) > 1
+    choice.send("DOWN_ARROW")
+    assert content() == state
+    assert choice.send("RET") == {"FINISHED"}
+    moved = changes(before, legs(loop))
+    assert moved[leg] == max(moved) > APART * diagonal(bpy.data.objects["Torus"])
+
+
+def test_the_leg_is_the_one_under_the_mouse(choice, loop, empty_scene, monkeypatch):
+    picking = module(empty_scene, "tool.picking")
+    error = module(empty_scene, "scene.messages").InputError
+    loop, leg = leg_with_courses()
+    hit = picking.Hit(picking.Kind.LINE, loop.name, leg + 1, (0.0, 0.0, 0.0), 0)
+    monkeypatch.setattr(picking, "under_mouse", lambda _context, _pixel: hit)
+    assert choice.press((1, 2)) == {"RUNNING_MODAL"}
+    assert choice.operator.leg == leg
+    choice.send("ESC")
+    for other in (None, picking.Hit(picking.Kind.POINT, loop.name, 0, (0.0, 0.0, 0.0), 0)):
+        monkeypatch.setattr(picking, "under_mouse", lambda _context, _pixel, hit=other: hit)
+        with pytest.raises(error, match="over a leg of the active curve"):
+            choice.press((1, 2))
+
+
+def test_a_leg_that_does_not_exist(loop):
+    before = content()
+    assert "no leg 4" in refusal("next_course", leg=4)
+    assert content() == before
+
+
+def test_on_a_changed_surface_the_curve_is_updated_first(loop, torus):
+    torus.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    assert "Run Update Curves first" in refusal("next_course", leg=0)
+    call("update_curves")
+    leg_with_courses()

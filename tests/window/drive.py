@@ -568,7 +568,7 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 8, f"eight items in {name}")
+        check(len(items) == 10, f"ten items in {name}")
         check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
     for config in ("Industry_Compatible", "Blender"):
         step(f"The keymap {config}")
@@ -652,6 +652,32 @@ def courses(blender: Blender) -> None:
     count_points(blender, len(PLACES))
     blender.shot("18-chosen-course")
     undo_and_redo(blender, [before, state(blender)], "of the choice")
+
+    step("Ctrl Shift Enter shows the courses of the leg under the mouse")
+    before = state(blender)
+    points = blender.do("value = helper.places()")
+    for leg in range(len(PLACES)):  # some have no other course
+        blender.move(blender.do(f"value = helper.pixels(helper.middle_of_leg({leg}))")[0])
+        time.sleep(0.5)
+        blender.key("ctrl+shift+Return")
+        time.sleep(0.5)
+        blender.wait("not helper.is_in_time_slices()", "the search")
+        time.sleep(0.5)
+        if blender.do("value = helper.courses()"):
+            break
+    check(blender.do("value = helper.courses()") is not None, "another course of a leg")
+    blender.mouse("click", 5)
+    blender.shot("18-leg")
+    blender.key("Return")
+    blender.wait(f"helper.state() != {before!r}", "another course of the leg")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    check(blender.do("value = helper.places()") == points, "the points stay")
+    blender.shot("18-leg-chosen")
+    undo_and_redo(blender, [before, state(blender)], "of the course of a leg")
+    blender.move(beside)
+    blender.key("ctrl+shift+Return")
+    time.sleep(1.0)
+    check(not blender.do("value = helper.is_modal()"), "beside the curve there is no choice")
 
 
 def via_points(blender: Blender) -> None:

@@ -18,7 +18,8 @@ import bpy
 import numpy as np
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-MODULE = "bl_ext.user_default.nicmm_curves.nicmm_blender"
+EXTENSION = "bl_ext.user_default.nicmm_curves"
+MODULE, CORE = f"{EXTENSION}.nicmm_blender", f"{EXTENSION}.nicmm_core"
 
 
 class Helper:
@@ -297,6 +298,18 @@ class Helper:
         """Points of the active curve object."""
         splines = cls.curve().data.splines
         return [list(point.co[:3]) for spline in splines for point in spline.points]
+
+    @classmethod
+    def middle_of_leg(cls, leg):
+        """The visible point of a leg of the active curve that is nearest to its middle."""
+        with cls.in_view():
+            picking = import_module(f"{MODULE}.tool.picking")
+            opened = picking.opened_now(bpy.context)
+            view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
+        core = import_module(f"{CORE}.geometry.curve")
+        line = opened.polyline()[core.points_of_leg(opened.curve, leg)]
+        seen = np.flatnonzero(view.visible(line))
+        return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
     @classmethod
     def state(cls):
