@@ -13,6 +13,7 @@ from . import command_line, preferences, settings
 from .interface import curve_list, map_rows, menus, panels
 from .operators import (
     convert_curve,
+    course_search,
     curve_settings,
     design_curve,
     live_update,
@@ -24,6 +25,8 @@ from .operators import (
 )
 from .scene import surface_cache
 from .tool import (
+    course_choice,
+    course_overlay,
     draw_operator,
     edit_operator,
     hover,
@@ -41,6 +44,7 @@ MODULES = (
     design_curve,
     convert_curve,
     update_curves,
+    course_search,
     next_course,
     maps,
     live_update,
@@ -48,8 +52,10 @@ MODULES = (
     edit_operator,
     point_operators,
     draw_operator,
+    course_choice,
     picking,
     overlay,
+    course_overlay,
     hover,
     toolbar,
     curve_list,

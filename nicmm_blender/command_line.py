@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
     bpy.ops.nicmm.design_curve(
         **{name: value for name, value in chosen.items() if value is not None},
         **_points(options),
+        **({} if options.via_points is None else {"via_points": options.via_points}),
     )
     bpy.ops.wm.save_as_mainfile(filepath=str(target), copy=True, check_existing=False)
 
@@ -122,6 +123,12 @@ def parser() -> argparse.ArgumentParser:
         metavar="I,J",
         help="control points at which the curve may turn freely, by their indices among the "
         "points, from 0",
+    )
+    command_parser.add_argument(
+        "--via-points",
+        metavar="LEG:A,B;…",
+        help='via points for each leg, such as "1: 57, 63; 2: 0.5 0 1"; legs have the indices of '
+        "the control points at which they begin",
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = command_parser.add_argument_group("settings", "The same as in the sidebar.")

@@ -49,6 +49,10 @@ class Design:
     asymmetry : float or None
         With a mirror, the greatest distance of the curve to its mirror image, in mesh units; less
         than a millionth of the diagonal if the surface is symmetric. None without a mirror.
+    relative_energy : float
+        For an alternative, its energy divided by that of the fairest curve; 1 for all other
+        designs. The energy is that by which alternatives are sorted. What maps contribute to the
+        difference counts in units of the energy without maps, since with maps it may be negative.
     """
 
     status: Status
@@ -62,6 +66,7 @@ class Design:
     alternatives: list[Design] = dataclass_field(default_factory=list)
     repairs: dict[str, int] = dataclass_field(default_factory=dict)
     asymmetry: float | None = None
+    relative_energy: float = 1.0
 
     def __repr__(self) -> str:
         return (

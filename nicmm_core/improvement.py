@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from .courses.bent_part import bent_parts
 from .courses.comparison import distinct_by_energy, is_apart
 from .errors import NicmmError
-from .relaxation.curve_energies import energies_of, scaled_bending
+from .relaxation.curve_energies import energies_of, relative_energies, scaled_bending
 from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
@@ -245,6 +245,11 @@ class Improvement:
     def best(self) -> int:
         """Index of the curve of least energy."""
         return self.energies.index(min(self.energies))
+
+    def relative_energies(self) -> list[float]:
+        """The same energies, relative to that of the best curve."""
+        scale = self.curves[0].length
+        return relative_energies(self._surface, self.curves, self.request.smoothness, scale)
 
     def by_energy(self) -> list[int]:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""

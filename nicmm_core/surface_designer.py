@@ -30,6 +30,7 @@ from .symmetry.half_order import in_shortest_order
 from .symmetry.half_search import NO_SYMMETRIC_CURVE, symmetric_by_halves
 from .symmetry.symmetric_relaxation import (
     MOST_CANDIDATES,
+    ComparedCurve,
     SymmetricCurve,
     best_symmetric,
     relaxed_symmetric,
@@ -141,17 +142,12 @@ class SurfaceDesigner:
         if request.mirror is not None:
             return self._designed_symmetric(request, max_iterations, started)
         curves, cancelled = self._curves(request, max_iterations)
-        best, *others = [
-            self._relaxed_design(request, start, relaxed, started)
-            for start, relaxed in curves[: 1 + request.alternatives]
-        ]
-        status = Status.CANCELLED if cancelled else best.status
-        return replace(best, status=status, alternatives=others)
+        return self._with_alternatives(request, curves, cancelled, started)
 
     def _curves(
         self, request: Request, max_iterations: int | None
-    ) -> tuple[list[tuple[InitialCurve, Relaxed]], bool]:
-        """Distinct curves by ascending energy with their starts, and whether it was cancelled."""
+    ) -> tuple[list[ComparedCurve], bool]:
+        """Distinct curves by ascending energy, and whether the search was cancelled."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
             courses = search.courses(request)
@@ -163,7 +159,7 @@ class SurfaceDesigner:
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
             cancelled = first.status is Status.CANCELLED
             if max_iterations is not None or cancelled:
-                return [(start, first)], cancelled
+                return [(start, first, 1.0)], cancelled
             improvement = Improvement(
                 search,
                 request,
@@ -177,7 +173,9 @@ class SurfaceDesigner:
             except CancelledError:
                 cancelled = True
         starts, relaxed = improvement.starts, improvement.relaxed
-        return [(starts[i], relaxed[i]) for i in improvement.by_energy()], cancelled
+        energies = improvement.relative_energies()
+        found = [(starts[i], relaxed[i], energies[i]) for i in improvement.by_energy()]
+        return found, cancelled
 
     def _designed_symmetric(
         self, request: Request, max_iterations: int | None, started: float
@@ -197,25 +195,33 @@ class SurfaceDesigner:
             raise UnreachableError(NO_SYMMETRIC_CURVE)
         left = None
         if max_iterations is not None:
-            left = max_iterations - sum(each.iterations for _, each in curves)
+            left = max_iterations - sum(each.iterations for _, each, _ in curves)
         relax = partial(_relaxed_unless_cancelled, given)
         found, cancelled = best_symmetric(given, begins, relax, left)
+        found = [
+            (replace(start, visited=number[start.visited]), relaxed, energy)
+            for start, relaxed, energy in found
+        ]
+        return self._with_alternatives(request, found, cancelled, started)
+
+    def _with_alternatives(
+        self, request: Request, curves: list[ComparedCurve], cancelled: bool, started: float
+    ) -> Design:
+        """The design of the first of some curves, with the next ones as alternatives."""
         best, *others = [
-            self._relaxed_design(
-                request, replace(start, visited=number[start.visited]), relaxed, started
-            )
-            for start, relaxed in found[: 1 + request.alternatives]
+            replace(self._relaxed_design(request, start, relaxed, started), relative_energy=energy)
+            for start, relaxed, energy in curves[: 1 + request.alternatives]
         ]
         status = Status.CANCELLED if cancelled else best.status
         return replace(best, status=status, alternatives=others)
 
     def _symmetric_curves(
-        self, request: Request, curves: list[tuple[InitialCurve, Relaxed]]
+        self, request: Request, curves: list[ComparedCurve]
     ) -> list[SymmetricCurve]:
         """Symmetric curves made of the best of some curves, or else of halves."""
         found = [
             symmetric
-            for start, each in curves[: MOST_CANDIDATES + request.alternatives]
+            for start, each, _ in curves[: MOST_CANDIDATES + request.alternatives]
             for symmetric in symmetric_from(request, start, each.discrete_curve)
         ]
         if found:

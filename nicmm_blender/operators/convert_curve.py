@@ -70,8 +70,9 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         if is_separate:
             self._take_appearance(original, mesh_object)
         corners = curve_record.corners_of(original)
+        via = curve_record.current_via_points(original, mesh_object, surface)
         summary = writing.apply(
-            context, mesh_object, surface, curves, self, curve_settings, corners
+            context, mesh_object, surface, curves, self, curve_settings, corners, via
         )
         if is_separate:
             converted = context.active_object

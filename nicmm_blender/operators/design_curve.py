@@ -52,6 +52,13 @@ class NICMM_OT_design_curve(
         "vertices, for scripts",
         options={"HIDDEN", "SKIP_SAVE"},
     )
+    via_points: StringProperty(
+        name="Via Points",
+        description="Points near which the curve runs on its way from one control point to the "
+        "next, for scripts. For each leg the index of the control point at which it begins and "
+        "points, such as 1: 57, 63; 2: 0.5 0 1",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     corners: settings.CORNERS
 
@@ -74,6 +81,9 @@ class NICMM_OT_design_curve(
         points, order = self._control_points(mesh_object, surface)
         curve_settings = curve_record.settings_from(self)
         request = design_request.for_points(mesh_object, surface, points, order, curve_settings)
+        if self.via_points:
+            via = selection.given_via_points(surface, self.via_points)
+            request = design_request.with_via_points(request, via)
         alternatives = _alternatives(self)
         if alternatives and self.output not in writing.SEPARATE:
             raise InputError(
@@ -122,6 +132,7 @@ class NICMM_OT_design_curve(
                 self,
                 request.settings,
                 design_request.corners_of(request, each),
+                request.via,
             )
             for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]

@@ -30,6 +30,20 @@ def with_error_reports(operator: bpy.types.Operator, work: Callable[[], set[str]
         return _cancelled(operator, str(error))
 
 
+def called(
+    operator: bpy.types.Operator, call: Callable[..., set[str]], how: str, **arguments: object
+) -> set[str]:
+    """Call another operator with an undo step, and report its errors as those of this one.
+
+    `how` is "INVOKE_DEFAULT" or "EXEC_DEFAULT".
+    """
+    try:
+        call(how, True, **arguments)
+    except RuntimeError as error:  # Blender raises what the operator has reported
+        return _cancelled(operator, str(error).removeprefix("Error: ").strip())
+    return {"FINISHED"}
+
+
 def _cancelled(operator: bpy.types.Operator, message: str) -> set[str]:
     operator.report({"ERROR"}, message)
     return {"CANCELLED"}

@@ -67,16 +67,19 @@ class LongSolves(SlicedOperator[list["Answer"]]):
     def end(
         self, context: bpy.types.Context, requests: list[DesignRequest], answers: list[Answer]
     ) -> set[str]:
-        """Finish, and drop everything that was kept during the work.
+        """Finish, and drop everything that was kept during the work unless the operator goes on.
 
         Blender keeps the last operators for the redo panel, and so would keep their meshes.
         """
         if context.mode == "EDIT_MESH":
             _include_all_data_in_undo()
+        result: set[str] = set()
         try:
-            return self.finish(context, requests, answers)
+            result = self.finish(context, requests, answers)
         finally:
-            vars(self).clear()
+            if "RUNNING_MODAL" not in result:
+                vars(self).clear()
+        return result
 
     def progress_text(self) -> str:
         return f"{round(100 * self._work.fraction)}%"

@@ -13,13 +13,14 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_OPEN
-from ..scene import curve_record, design_request, mesh_data, surface_cache
+from ..scene import curve_record, design_request, mesh_data, point_lists, surface_cache
 from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
+from ..scene.via_points import ViaPoints, leg_before, no_via_points, number_of_legs
 from . import curve_object, writing
 from .writing import ObjectSettings
 
@@ -50,6 +51,8 @@ class Opened:
         Settings of the curve.
     points : ControlPoints
         Control points on the surface.
+    via : ViaPoints
+        Via points on the surface.
     curve : SurfaceCurve of the core, or None
         The recorded curve; None if the curve is new or has to be designed again.
     remark : str
@@ -61,6 +64,7 @@ class Opened:
     surface: Surface
     settings: CurveSettings
     points: ControlPoints
+    via: ViaPoints
     curve: SurfaceCurve | None
     remark: str
 
@@ -80,6 +84,10 @@ class Opened:
     def positions(self) -> np.ndarray:
         """Positions of the control points in the object's local space, (k, 3)."""
         return positions_of(self.surface, self.points)
+
+    def via_positions(self) -> np.ndarray:
+        """Positions of the via points in the object's local space, (m, 3)."""
+        return self.surface.points(self.via.points.faces, self.via.points.barycentric)
 
     def polyline(self) -> np.ndarray:
         """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
@@ -176,8 +184,9 @@ def open_curve(
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     points = ControlPoints(none, np.zeros(0, dtype=bool))
-    curve = None
+    via, curve = no_via_points(), None
     if edited is not None:
+        via = curve_record.current_via_points(edited, mesh_object, surface)
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
         if moved:
             points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
@@ -190,7 +199,7 @@ def open_curve(
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
-    return Opened(uid, mesh_object.session_uid, surface, settings, points, curve, remark)
+    return Opened(uid, mesh_object.session_uid, surface, settings, points, via, curve, remark)
 
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
@@ -198,7 +207,9 @@ def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     if len(points) < FEWEST_OPEN:
         return []
     settings = replace(edited.settings, method="ELASTIC")
-    found = design_request.for_drawing(edited.mesh_object, edited.surface, points, settings)
+    found = design_request.for_drawing(
+        edited.mesh_object, edited.surface, points, edited.via, settings
+    )
     return [replace(found, start=edited.curve)]
 
 
@@ -256,6 +267,7 @@ def _record(
     drawn: Drawn | None,
 ) -> None:
     curve_settings = replace(edited.settings, method="ELASTIC")
+    via = edited.via.fitting(len(points), curve_settings.closed)
     curve_record.write_record(
         result,
         mesh_object,
@@ -265,6 +277,7 @@ def _record(
         drawn,
         points.corners,
         points.places,
+        via,
     )
 
 
@@ -296,28 +309,60 @@ def with_point(
 
     A replaced point stays a corner; an inserted one is none.
     """
-    from ... import nicmm_core as nicmm
-
-    rest = without_point(points, number) if replaced else points
-    is_corner = bool(points.corners[number]) if replaced else False
-    places = nicmm.SurfacePoints(
-        np.insert(rest.places.faces, number, place.faces[0]),
-        np.insert(rest.places.barycentric, number, place.barycentric[0], axis=0),
-    )
-    return ControlPoints(places, np.insert(rest.corners, number, is_corner))
+    corners = points.corners
+    if not replaced:
+        corners = np.insert(corners, number, False)
+    return ControlPoints(point_lists.with_point(points.places, number, place, replaced), corners)
 
 
 def without_point(points: ControlPoints, number: int) -> ControlPoints:
     """Points without the one at an index."""
-    kept = np.delete(np.arange(len(points)), number)
-    return ControlPoints(points.places[kept], points.corners[kept])
+    places = point_lists.without_point(points.places, number)
+    return ControlPoints(places, np.delete(points.corners, number))
 
 
 def with_toggled_corner(points: ControlPoints, number: int) -> ControlPoints:
-    """Points of which the one at an index has become a corner, or is none any more."""
+    """Points of which the one at an index has become a corner, or has become smooth again."""
     corners = points.corners.copy()
     corners[number] = not corners[number]
     return replace(points, corners=corners)
+
+
+def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> ViaPoints:
+    """The via points after the control point `place` has been inserted at an index."""
+    count, closed = len(edited.points), edited.settings.closed
+    leg = leg_before(number, count, closed)
+    via = edited.via
+    divided, is_behind = via.legs == leg, np.zeros(len(via), dtype=bool)
+    if divided.any():
+        along = _along_leg(edited, leg, via.points[divided])
+        is_behind[divided] = along >= _along_leg(edited, leg, place)
+    return via.after_insertion(number, count, closed, is_behind)
+
+
+def checked_leg(edited: Opened, leg: int) -> int:
+    """The index of a leg; an error if the curve has no such leg."""
+    count = number_of_legs(len(edited.points), edited.settings.closed)
+    if not 0 <= leg < count:
+        raise InputError(f"There is no leg {leg}; the curve has {count}, counted from 0")
+    return leg
+
+
+def index_of_new_via(edited: Opened, leg: int, place: SurfacePoints) -> int:
+    """The index among the via points of one that is added to a leg, by its position there."""
+    via = edited.via
+    earlier = _along_leg(edited, leg, via.points[via.legs == leg]) < _along_leg(edited, leg, place)
+    return int((via.legs < leg).sum() + earlier.sum())
+
+
+def _along_leg(edited: Opened, leg: int, points: SurfacePoints) -> np.ndarray:
+    """How far along a leg of the curve points are, (k,); 0 without a curve."""
+    from ...nicmm_core.geometry.curve import along_leg
+
+    if edited.curve is None:
+        return np.zeros(len(points))
+    mesh = surface_cache.core_mesh(edited.surface)
+    return along_leg(edited.curve, leg, points.positions(mesh))
 
 
 def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:

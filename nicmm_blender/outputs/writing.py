@@ -16,6 +16,7 @@ from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest, corners_of
 from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.surface import Surface
+from ..scene.via_points import ViaPoints
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
@@ -83,17 +84,18 @@ def apply(
     settings: OutputSettings,
     curve_settings: CurveSettings,
     corners: np.ndarray,
+    via: ViaPoints | None = None,
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
-    `settings` holds the output settings, `curve_settings` the settings of the curves, and
-    `corners`, (k,), tells which of their control points are corners.
+    `settings` holds the output settings, `curve_settings` the settings of the curves, `corners`,
+    (k,), tells which of their control points are corners, and `via` are their via points.
     """
     if settings.output in SEPARATE:
         new_object = as_object(mesh_object, surface, curves, settings, corners)
         drawn = drawn_as(settings)
         curve_record.write_record(
-            new_object, mesh_object, surface, curves, curve_settings, drawn, corners
+            new_object, mesh_object, surface, curves, curve_settings, drawn, corners, via=via
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
@@ -232,6 +234,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         request.settings,
         curve_record.drawn_as(designed),
         corners,
+        via=request.via,
     )
 
 

@@ -3,9 +3,9 @@
 
 Each point is stored by the three vertices of its triangle and its barycentric coordinates: vertices
 keep their indices when the mesh is moved or deformed, and when the file is opened again. Control
-points are stored in the same form, together with the settings, so that the curve can be edited. On
-a surface that modifiers generate, each control point is also stored by the face of the cage that it
-comes from, because that face stays the same when the subdivision level changes.
+points and via points are stored in the same form, together with the settings, so that the curve can
+be edited. On a surface that modifiers generate, each of them is also stored by the face of the cage
+that it comes from, because that face stays the same when the subdivision level changes.
 """
 
 from __future__ import annotations
@@ -26,10 +26,14 @@ from .lookup import is_in
 from .messages import InputError, check_finite
 from .record_check import Record
 from .surface import Surface, group_weights, read
+from .via_points import ViaPoints, no_via_points
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve, SurfacePoints
     from ...nicmm_core.options import Option
+
+CONTROL, VIA = "control_", "via_"
+"""Beginnings of the names of the fields of control points and of via points."""
 
 RECORD_KEY = "nicmm_curve"
 """Custom property of the object that holds the record."""
@@ -37,9 +41,10 @@ RECORD_KEY = "nicmm_curve"
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
-VERSION = 3
+VERSION = 4
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
-of version 1 do not store whether modifiers are used, and those up to 2 have `FORMER_METHODS`."""
+of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, and those
+up to 3 have no via points."""
 
 FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
 """Methods by their names in records of versions before 3."""
@@ -150,6 +155,7 @@ def write_record(
     drawn: Drawn | None,
     corners: np.ndarray,
     controls: SurfacePoints | None = None,
+    via: ViaPoints | None = None,
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
@@ -172,6 +178,8 @@ def write_record(
         Whether each control point is a corner.
     controls : SurfacePoints, optional
         Control points; by default those of the curves.
+    via : ViaPoints, optional
+        Via points; by default none.
     """
     if controls is None:
         found = [curve.control_index[curve.control_index >= 0] for curve in curves]
@@ -180,11 +188,10 @@ def write_record(
         control_barycentric = np.concatenate([curve.barycentric[index] for curve, index in pairs])
     else:
         control_faces, control_barycentric = controls.faces, controls.barycentric
-    known = {"positions": surface.points(control_faces, control_barycentric)}
-    if surface.cage is not None:
-        cage_points = to_cage_points(surface, surface.cage, control_faces, control_barycentric)
-        known |= {"cage_faces": cage_points.faces, "cage_places": cage_points.face_coordinates}
-        known["cage_copies"] = cage_points.copies
+    points = _points_to_store(CONTROL, surface, control_faces, control_barycentric)
+    if via is not None and len(via):
+        points["via_legs"] = via.legs.tolist()
+        points |= _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
     curve_object[RECORD_KEY] = {
         "version": VERSION,
         "mesh": mesh_object,
@@ -198,9 +205,7 @@ def write_record(
         "barycentric": _flat([curve.barycentric for curve in curves]),
         "control_counts": [len(curve.control_index) for curve in curves],
         "control_index": _flat([curve.control_index for curve in curves]),
-        "control_corners": surface.faces[control_faces].ravel().tolist(),
-        "control_barycentric": control_barycentric.ravel().tolist(),
-        **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
+        **points,
         "corner_points": corners.astype(int).tolist(),
         "asked": asdict(settings),
         **({} if drawn is None else {"drawn": drawn}),
@@ -208,6 +213,22 @@ def write_record(
     # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings)
     surface_cache.note_change()
+
+
+def _points_to_store(
+    kind: str, surface: Surface, faces: np.ndarray, barycentric: np.ndarray
+) -> dict[str, list[float]]:
+    """Points as a record stores them, by names that begin with their kind."""
+    values = {
+        "corners": surface.faces[faces],
+        "barycentric": barycentric,
+        "positions": surface.points(faces, barycentric),
+    }
+    if surface.cage is not None:
+        cage_points = to_cage_points(surface, surface.cage, faces, barycentric)
+        values |= {"cage_faces": cage_points.faces, "cage_places": cage_points.face_coordinates}
+        values["cage_copies"] = cage_points.copies
+    return {kind + name: array.ravel().tolist() for name, array in values.items()}
 
 
 def _flat(arrays: list[np.ndarray]) -> list[float]:
@@ -365,7 +386,7 @@ def positions_of(curve_object: bpy.types.Object, surface: Surface) -> tuple[np.n
     """
     record = _checked_record(curve_object)
     found = []
-    for kind in ("control_", ""):
+    for kind in (CONTROL, ""):
         names = (f"{kind}corners", f"{kind}barycentric")
         faces, barycentric = (np.zeros(0, np.int64), np.zeros((0, 3)))
         if names[0] in record:
@@ -474,15 +495,50 @@ def read_control_points(
         index = curve.control_index
         found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
         return found, surface.points(found.faces, found.barycentric)
-    names = ("control_corners", "control_barycentric")
+    return _read_points(record, CONTROL, surface)
+
+
+def _read_points(record: Record, kind: str, surface: Surface) -> tuple[SurfacePoints, np.ndarray]:
+    """Control points or via points, and their positions, as `read_control_points` returns them."""
+    from ... import nicmm_core as nicmm
+
+    names = (f"{kind}corners", f"{kind}barycentric")
     found = nicmm.SurfacePoints(*_find_points(record, *names, surface))
-    return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
+    return found, np.array(record[f"{kind}positions"], dtype=np.float64).reshape(-1, 3)
+
+
+def current_via_points(
+    curve_object: bpy.types.Object, mesh_object: bpy.types.Object, surface: Surface
+) -> ViaPoints:
+    """The via points of a curve on the current surface, found like its control points."""
+    record = _checked_record(curve_object)
+    if "via_legs" not in record:
+        return no_via_points()
+    found = _read_points(record, VIA, surface)
+    points, _ = _on_surface(curve_object, mesh_object, surface, VIA, *found)
+    return ViaPoints(np.array(record["via_legs"], dtype=np.int64), points)
 
 
 def current_control_points(
     curve_object: bpy.types.Object, mesh_object: bpy.types.Object, surface: Surface
 ) -> tuple[ControlPoints, int]:
-    """The control points of a curve on the current surface, and how many of them were moved.
+    """The control points of a curve on the current surface, and how many of them were moved."""
+    if not len(surface.faces):
+        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
+    found = read_control_points(curve_object, surface)
+    places, moved = _on_surface(curve_object, mesh_object, surface, CONTROL, *found)
+    return ControlPoints(places, corners_of(curve_object)), moved
+
+
+def _on_surface(
+    curve_object: bpy.types.Object,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    kind: str,
+    points: SurfacePoints,
+    positions: np.ndarray,
+) -> tuple[SurfacePoints, int]:
+    """Points that were read, on the current surface, and how many of them were moved.
 
     A point whose triangle no longer exists is located by the face of the cage that it came from. If
     that fails too, it is moved to the nearest point of the surface.
@@ -490,14 +546,11 @@ def current_control_points(
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
 
-    if not len(surface.faces):
-        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
-    points, positions = read_control_points(curve_object, surface)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
     lost = faces < 0
     if lost.any():
         cage = identity_trace(surface) if surface.cage is None else surface.cage
-        cage_points = _cage_points(curve_object, mesh_object, cage.sizes)
+        cage_points = _cage_points(curve_object, mesh_object, cage.sizes, kind)
         if cage_points is not None:
             there, weights = to_surface_points(surface, cage, cage_points)
             faces[lost], barycentric[lost] = there[lost], weights[lost]
@@ -506,8 +559,7 @@ def current_control_points(
         mesh = surface_cache.core_mesh(surface)
         nearest, _ = nearest_points(mesh, positions[lost] @ surface.local_to_core.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
-    places = nicmm.SurfacePoints(faces, barycentric)
-    return ControlPoints(places, corners_of(curve_object)), int(lost.sum())
+    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
 def corners_of(curve_object: bpy.types.Object) -> np.ndarray:
@@ -521,9 +573,12 @@ def corners_of(curve_object: bpy.types.Object) -> np.ndarray:
 
 
 def _cage_points(
-    curve_object: bpy.types.Object, mesh_object: bpy.types.Object, sizes: tuple[int, int, int]
+    curve_object: bpy.types.Object,
+    mesh_object: bpy.types.Object,
+    sizes: tuple[int, int, int],
+    kind: str,
 ) -> CagePoints | None:
-    """The control points of a curve in faces of the cage; None if unknown.
+    """The control points or via points of a curve in faces of the cage; None if unknown.
 
     `sizes` are the current numbers of vertices, faces and corners of the cage.
     """
@@ -532,12 +587,16 @@ def _cage_points(
         if tuple(record["cage"]) != sizes:
             return None
         return CagePoints(
-            np.array(record["control_cage_faces"], dtype=np.int64),
-            np.array(record["control_cage_places"], dtype=np.float64).reshape(-1, 2),
-            np.array(record["control_cage_copies"], dtype=np.int64),
+            np.array(record[f"{kind}cage_faces"], dtype=np.int64),
+            np.array(record[f"{kind}cage_places"], dtype=np.float64).reshape(-1, 2),
+            np.array(record[f"{kind}cage_copies"], dtype=np.int64),
         )
     cage = read(mesh_object, use_modifiers=False)
-    points, _ = read_control_points(curve_object, cage)
+    points = (
+        read_control_points(curve_object, cage)[0]
+        if kind == CONTROL
+        else _read_points(record, kind, cage)[0]
+    )
     there = points.faces >= 0
     if not there.any():
         return None

@@ -21,9 +21,10 @@ from .curve_record import CurveSettings
 from .lookup import by_uid
 from .messages import InputError, user_message
 from .surface import Surface, group_weights, read
+from .via_points import ViaPoints
 
 if TYPE_CHECKING:
-    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core import Design, Designer, SurfaceCurve, SurfacePoints
     from ...nicmm_core.progress import Progress
 
     Answer = Design | Exception
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points`, `options` and `start` are arguments for the core. `moved` counts the control points
-    that were moved to the nearest point of the surface because their triangles no longer exist.
+    `points`, `options` and `start` are arguments for the core; `options` has the via points, too.
+    With a `leg`, only other courses of this leg of the start are sought. `moved` counts the control
+    points that were moved to the nearest point of the surface because their triangles no longer
+    exist.
     """
 
     mesh_name: str
@@ -45,7 +48,9 @@ class DesignRequest:
     order: str
     settings: CurveSettings
     options: dict[str, Any]
+    via: ViaPoints | None = None
     start: Design | SurfaceCurve | None = None
+    leg: int | None = None
     moved: int = 0
 
     def mesh_object(self) -> bpy.types.Object | None:
@@ -113,14 +118,26 @@ def for_points(
 
 
 def for_drawing(
-    mesh_object: bpy.types.Object, surface: Surface, points: ControlPoints, settings: CurveSettings
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    points: ControlPoints,
+    via: ViaPoints,
+    settings: CurveSettings,
 ) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
     request = for_points(mesh_object, surface, points.places, "given", settings)
     closed = settings.closed and len(points) >= FEWEST_CLOSED
     # Other methods have no corners.
     corners = corner_indices(points.corners) if settings.method == "ELASTIC" else None
-    return replace(request, options={**request.options, "closed": closed, "corners": corners})
+    options = {**request.options, "closed": closed, "corners": corners}
+    return with_via_points(replace(request, options=options), via.fitting(len(points), closed))
+
+
+def with_via_points(request: DesignRequest, via: ViaPoints) -> DesignRequest:
+    """A request with via points; they need the order "given"."""
+    if not len(via):
+        return request
+    return replace(request, via=via, options={**request.options, "via_points": via.by_leg()})
 
 
 def corner_indices(corners: np.ndarray) -> list[int] | None:
@@ -146,7 +163,8 @@ def for_curve(
     points, moved = curve_record.current_control_points(curve_object, mesh_object, surface)
     if len(points) < FEWEST_OPEN:
         raise InputError(curve_record.no_curve_message(curve_object))
-    request = for_drawing(mesh_object, surface, points, settings)
+    via = curve_record.current_via_points(curve_object, mesh_object, surface)
+    request = for_drawing(mesh_object, surface, points, via, settings)
     start = None
     if settings.method == "ELASTIC" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
@@ -164,6 +182,8 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
             design = None
+            if request.leg is not None:
+                return _leg_courses(designer, request, progress)
             if request.start is not None:
                 # If the curve cannot keep its course, the core searches for a new one below.
                 with contextlib.suppress(nicmm.CurveError):
@@ -176,3 +196,16 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
             vertices = request.points if isinstance(request.points, np.ndarray) else None
             at = vertices if vertices is not None and vertices.ndim == 1 else None
             raise InputError(user_message(error, settings.obstacle_group, at)) from error
+
+
+def _leg_courses(designer: Designer, request: DesignRequest, progress: Progress) -> Design:
+    """The courses that one leg of a curve can take; the curve is the start of the request."""
+    from ... import nicmm_core as nicmm
+    from ...nicmm_core.leg_courses import leg_courses
+
+    assert isinstance(request.points, nicmm.SurfacePoints)
+    assert isinstance(request.start, nicmm.SurfaceCurve)
+    assert request.leg is not None
+    return leg_courses(
+        designer, request.points, request.start, request.leg, progress=progress, **request.options
+    )

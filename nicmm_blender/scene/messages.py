@@ -32,6 +32,9 @@ def user_message(
         if point.argument == "control_points":
             at = "" if vertices is None else f" (vertex {vertices[point.index]})"
             text = text.replace(str(point), f"point {point.index + 1}{at}")
+        elif leg := re.fullmatch(r"via_points\[(\d+)\]", point.argument):
+            before = int(leg[1]) + 1
+            text = text.replace(str(point), f"via point {point.index + 1} after point {before}")
     text = text.replace("control_points has 1 point,", "there is 1 point,")
     text = text.replace("control_points has", "there are").replace("control_points", "the points")
     text = re.sub(r"in the order \[([\d, ]+)\]", _counted_from_one, text)

@@ -64,24 +64,34 @@ def _check_points(record: Record) -> None:
         if len(counts) != 1:
             raise _DamagedError(f"it has no control points and {len(counts)} curves")
         return
-    controls = _whole(record, "control_corners", least=0)
-    if len(controls) % 3:
-        raise _DamagedError("the length of control_corners is not a multiple of three")
-    _numbers(record, "control_barycentric", len(controls))
-    _numbers(record, "control_positions", len(controls))
-    if (
-        "corner_points" in record
-        and (_whole(record, "corner_points", len(controls) // 3, least=0) > 1).any()
-    ):
+    count = _check_stored(record, "control_")
+    if "corner_points" in record and (_whole(record, "corner_points", count, least=0) > 1).any():
         raise _DamagedError("corner_points has values other than 0 and 1")
+    if "via_legs" in record:
+        legs = _whole(record, "via_legs", _check_stored(record, "via_"), least=0)
+        if (np.diff(legs) < 0).any() or (legs >= count).any():
+            raise _DamagedError("a via point is on a leg that does not exist")
     if not len(counts) and (len(closed) or len(control_counts)):
         raise _DamagedError("it has settings of a curve but no curve")
+
+
+def _check_stored(record: Record, kind: str) -> int:
+    """Check control points or via points, whose names begin with their kind; return their number.
+
+    On a surface that modifiers generate they are also stored on the cage.
+    """
+    corners = _whole(record, f"{kind}corners", least=0)
+    if len(corners) % 3:
+        raise _DamagedError(f"the length of {kind}corners is not a multiple of three")
+    _numbers(record, f"{kind}barycentric", len(corners))
+    _numbers(record, f"{kind}positions", len(corners))
+    count = len(corners) // 3
     if len(record.get("cage", ())):
-        count = len(controls) // 3
         _whole(record, "cage", 3, least=0)
-        _whole(record, "control_cage_faces", count, least=-1)
-        _numbers(record, "control_cage_places", 2 * count)
-        _whole(record, "control_cage_copies", count, least=0)
+        _whole(record, f"{kind}cage_faces", count, least=-1)
+        _numbers(record, f"{kind}cage_places", 2 * count)
+        _whole(record, f"{kind}cage_copies", count, least=0)
+    return count
 
 
 def _check_settings(record: Record, settings_type: type) -> None:

@@ -14,6 +14,7 @@ from . import surface_cache
 from .cage_trace import CageTrace
 from .messages import InputError
 from .surface import Surface, group_weights
+from .via_points import ViaPoints, sorted_by_leg
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfacePoints
@@ -94,18 +95,44 @@ def given_points(surface: Surface, text: str, order: str) -> tuple[np.ndarray | 
     The text lists vertex indices of the mesh or positions in the object's local space, such as
     "12, 80, 0.5 0 1".
     """
-    core_order = "shortest" if order == "SHORTEST" else "given"
+    return _points_in(surface, text), "shortest" if order == "SHORTEST" else "given"
+
+
+def given_via_points(surface: Surface, text: str) -> ViaPoints:
+    """The via points that a script gives as text, such as "1: 57, 63; 2: 0.5 0 1".
+
+    For each leg these are the index of the control point at which it begins, and points as in
+    `given_points`.
+    """
+    from ...nicmm_core.geometry.surface_points import joined, locate_points
+
+    legs, parts = [], []
+    for words in text.split(";"):
+        leg, colon, points = words.partition(":")
+        if not colon or not leg.strip().isdigit():
+            raise InputError(
+                f'The via points "{words.strip()}" name no leg. Give the index of the control '
+                'point at which it begins, a colon and points, such as "1: 57, 63; 2: 0.5 0 1"'
+            )
+        mesh = surface_cache.core_mesh(surface)
+        parts.append(locate_points(mesh, _points_in(surface, points), "via_points"))
+        legs += [int(leg)] * len(parts[-1])
+    return sorted_by_leg(np.array(legs, dtype=np.int64), joined(parts))
+
+
+def _points_in(surface: Surface, text: str) -> np.ndarray | SurfacePoints:
+    """Points for the core from a text such as "12, 80, 0.5 0 1"."""
     count = len(surface.local_positions) if surface.cage is None else len(surface.cage.vertices)
     given = [_given_point(word, count) for word in text.split(",")]
     if all(isinstance(point, int) for point in given):
-        return points_at(surface, np.array(given, dtype=np.int64)), core_order
+        return points_at(surface, np.array(given, dtype=np.int64))
     places = [
         positions_at(surface, np.array([point]))[0]
         if isinstance(point, int)
         else surface.local_to_core @ point
         for point in given
     ]
-    return np.array(places), core_order
+    return np.array(places)
 
 
 def given_corners(text: str, count: int) -> np.ndarray:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bpy
@@ -23,6 +24,7 @@ from . import modes
 if TYPE_CHECKING:
     from ...nicmm_core import SurfacePoints
     from ..scene.design_request import Answer
+    from ..scene.via_points import ViaPoints
 
 
 class ChangesPoints(LongSolves):
@@ -30,6 +32,9 @@ class ChangesPoints(LongSolves):
 
     `dragged` is the position of a dragged point, as a point of the core, or None in a script.
     """
+
+    searches_course = False
+    """Whether the change selects a course, which is searched for; otherwise the curve keeps its."""
 
     curve: str
     index: int
@@ -43,7 +48,17 @@ class ChangesPoints(LongSolves):
 
     def changed(self, opened: Opened) -> ControlPoints:
         """The control points after the change."""
-        raise NotImplementedError
+        return opened.points
+
+    def changed_via(self, opened: Opened) -> ViaPoints:
+        """The via points after the change."""
+        return opened.via
+
+    def edited(self, opened: Opened) -> Opened:
+        """The curve after the change, before it is designed."""
+        curve = None if self.searches_course else opened.curve
+        via = self.changed_via(opened)
+        return replace(opened, points=self.changed(opened), via=via, curve=curve)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -51,9 +66,8 @@ class ChangesPoints(LongSolves):
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
     def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
-        self._opened = self.open_curve(context)
-        self._points = self.changed(self._opened)
-        return edited_curve.request(self._opened, self._points)
+        self._edited = self.edited(self.open_curve(context))
+        return edited_curve.request(self._edited, self._edited.points)
 
     def open_curve(self, context: bpy.types.Context) -> Opened:
         """Open the curve to change."""
@@ -67,11 +81,12 @@ class ChangesPoints(LongSolves):
     ) -> set[str]:
         curves = edited_curve.curves_of(answers)
         panel = context.scene.nicmm_curves
-        opened, points = self._opened, self._points
-        result = edited_curve.write(context, opened, points, curves, _Output(panel))
+        edited = self._edited
+        result = edited_curve.write(context, edited, edited.points, curves, _Output(panel))
         modes.make_active(context, result)
-        if opened.remark:
-            self.report({"WARNING"}, f'"{result.name}" through {len(points)} points{opened.remark}')
+        if edited.remark:
+            count = len(edited.points)
+            self.report({"WARNING"}, f'"{result.name}" through {count} points{edited.remark}')
         return {"FINISHED"}
 
     def checked_index(self, opened: Opened) -> int:
@@ -80,6 +95,15 @@ class ChangesPoints(LongSolves):
         if not 0 <= self.index < count:
             raise InputError(
                 f"There is no control point {self.index}; the curve has {count}, counted from 0"
+            )
+        return self.index
+
+    def checked_via_index(self, opened: Opened) -> int:
+        """The index of the via point; an error if there is no such point."""
+        count = len(opened.via)
+        if not 0 <= self.index < count:
+            raise InputError(
+                f"There is no via point {self.index}; the curve has {count}, counted from 0"
             )
         return self.index
 

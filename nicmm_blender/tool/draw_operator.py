@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ..operators.error_reports import with_error_reports
+from ..operators.error_reports import called, with_error_reports
 from ..operators.sliced_operator import SlicedOperator
 from ..scene import surface_cache
 from . import modes, picking
@@ -30,7 +30,13 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
 
     remove: bpy.props.BoolProperty(
         name="Remove",
-        description="Remove the point under the mouse instead",
+        description="Remove the point or the via point under the mouse instead",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    via: bpy.props.BoolProperty(
+        name="Via Point",
+        description="Add a via point to the active curve under the mouse, or move one, instead",
         default=False,
         options={"SKIP_SAVE"},
     )
@@ -78,32 +84,34 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
         hit = picking.under_mouse(context, self._pixel)
         if hit is None:
             return PASS
-        call = _call_of(hit, self.remove)
+        call = _call_of(hit, self.remove, self.via)
         if call is None:
             return PASS
         operator, arguments = call
         if "from_mouse" in arguments:
             arguments["from_mouse"] = self._is_down
-        try:
-            operator("INVOKE_DEFAULT", True, **arguments)
-        except RuntimeError as error:  # Blender raises what the operator has reported
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        return called(self, operator, "INVOKE_DEFAULT", **arguments)
 
 
 def _call_of(
-    hit: picking.Hit, remove: bool
+    hit: picking.Hit, remove: bool, via: bool
 ) -> tuple[Callable[..., set[str]], dict[str, object]] | None:
     """The operator for what is under the mouse, with its arguments; None if there is none."""
     calls = bpy.ops.nicmm
     if remove:
-        if hit.kind is not Kind.POINT:
+        removals = {Kind.POINT: calls.remove_point, Kind.VIA: calls.remove_via_point}
+        if hit.kind not in removals:
             return None
-        return calls.remove_point, {"curve": hit.name, "index": hit.index}
+        return removals[hit.kind], {"curve": hit.name, "index": hit.index}
+    named = {"curve": hit.name, "position": hit.position, "from_mouse": True}
+    if hit.kind is Kind.VIA:
+        return calls.move_via_point, {**named, "index": hit.index}
+    if via:
+        if hit.kind is not Kind.LINE:
+            return None
+        return calls.add_via_point, {**named, "leg": hit.index - 1}
     if hit.kind is Kind.CURVE:
         return calls.activate_curve, {"curve": hit.name}
-    named = {"curve": hit.name, "position": hit.position, "from_mouse": True}
     if hit.kind is Kind.SURFACE:
         return calls.add_point, named
     operator = calls.move_point if hit.kind is Kind.POINT else calls.insert_point

@@ -17,6 +17,7 @@ from ..scene import curve_record, selection
 from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError
+from ..scene.via_points import ViaPoints, no_via_points, sorted_by_leg
 from . import modes
 
 if TYPE_CHECKING:
@@ -35,6 +36,16 @@ class NICMM_PG_control_point(bpy.types.PropertyGroup):
         name="Position",
         description="Position on the surface in the object's local space",
         subtype="TRANSLATION",
+    )
+
+
+class NICMM_PG_via_point(NICMM_PG_control_point):
+    """A via point, for scripts"""
+
+    leg: bpy.props.IntProperty(
+        name="Leg",
+        description="Index of the control point at which the leg begins",
+        min=0,
     )
 
 
@@ -69,6 +80,13 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         name="Control Points",
         description="Control points of the curve, for scripts. Leave empty to keep its points",
         type=NICMM_PG_control_point,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+    via_points: bpy.props.CollectionProperty(
+        name="Via Points",
+        description="Via points of the curve, for scripts. Leave empty to keep those of the curve, "
+        "or, with other control points, for none",
+        type=NICMM_PG_via_point,
         options={"SKIP_SAVE", "HIDDEN"},
     )
 
@@ -128,14 +146,18 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             positions = np.array([point.position[:] for point in self.points])
             places = edited_curve.surface_points_at(opened, positions, "points")
             points = ControlPoints(places, np.zeros(len(places), dtype=bool))
+            opened = replace(opened, points=points, via=no_via_points())
         elif edited is None:
             raise InputError(
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
                 "z)}, …], or draw with the Surface Curve tool in the 3D viewport"
             )
-        if self.properties.is_property_set("corners"):
+        changes_corners = self.properties.is_property_set("corners")
+        if changes_corners:
             points = replace(points, corners=selection.given_corners(self.corners, len(points)))
-        if points is not opened.points or opened.curve is None:
+        if len(self.via_points):  # they select the course, so it is searched for
+            opened = replace(opened, via=self._given_via_points(opened), curve=None)
+        if len(self.points) or changes_corners or opened.curve is None:
             curves = _design_curves(context, opened, points)
         else:
             curves = [opened.curve]
@@ -143,6 +165,12 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         self._store(opened, points)
         self.report({"INFO"}, f'"{result.name}" through {len(points)} points{opened.remark}')
         return {"FINISHED"}
+
+    def _given_via_points(self, opened: Opened) -> ViaPoints:
+        legs = [edited_curve.checked_leg(opened, point.leg) for point in self.via_points]
+        positions = np.array([point.position[:] for point in self.via_points])
+        points = edited_curve.surface_points_at(opened, positions, "via_points")
+        return sorted_by_leg(np.array(legs, dtype=np.int64), points)
 
     def _settings_for(
         self, context: bpy.types.Context, edited: bpy.types.Object | None
@@ -167,6 +195,10 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         for position in edited_curve.positions_of(opened.surface, points):
             self.points.add().position = position
         self.corners = ", ".join(map(str, np.flatnonzero(points.corners)))
+        self.via_points.clear()
+        for leg, position in zip(opened.via.legs, opened.via_positions(), strict=True):
+            stored = self.via_points.add()
+            stored.leg, stored.position = leg, position
 
 
 def _design_curves(
@@ -181,9 +213,11 @@ def _design_curves(
 
 def register() -> None:
     bpy.utils.register_class(NICMM_PG_control_point)
+    bpy.utils.register_class(NICMM_PG_via_point)
     bpy.utils.register_class(NICMM_OT_edit_curve)
 
 
 def unregister() -> None:
     bpy.utils.unregister_class(NICMM_OT_edit_curve)
+    bpy.utils.unregister_class(NICMM_PG_via_point)
     bpy.utils.unregister_class(NICMM_PG_control_point)

@@ -35,6 +35,8 @@ class LiveCurve:
     ----------
     request : DesignRequest
         Request with the current points and the last curve as its start.
+    keeps_course : bool
+        Whether the curve keeps its course; otherwise every move needs a design from scratch.
     waiting : bool
         Whether the curve has to be designed from scratch.
     steps_left : int
@@ -43,9 +45,9 @@ class LiveCurve:
         Why there is no curve through the points; empty if there is one.
     """
 
-    def __init__(self, request: DesignRequest) -> None:
-        self.request = request
-        self.waiting, self.steps_left = request.start is None, 0
+    def __init__(self, request: DesignRequest, keeps_course: bool = True) -> None:
+        self.request, self.keeps_course = request, keeps_course
+        self.waiting, self.steps_left = request.start is None or not keeps_course, 0
         self.problem = ""
 
     @property
@@ -57,9 +59,10 @@ class LiveCurve:
         return found.curves[0] if isinstance(found, nicmm.Design) else found
 
     def move(self, points: ControlPoints) -> None:
-        """Move the control points and take a first step."""
+        """Move the control points, or a via point, and take a first step."""
         self.request = replace(self.request, points=points.places)
-        self.waiting, self.steps_left = self.request.start is None, MOST_STEPS
+        self.waiting = self.request.start is None or not self.keeps_course
+        self.steps_left = MOST_STEPS
         if not self.waiting:
             self.step()
 

@@ -28,7 +28,6 @@ from .view import OFFSET, View
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve
-    from ..scene.control_points import ControlPoints
 
 Colour = tuple[float, ...]
 """Red, green and blue, and possibly opacity."""
@@ -37,10 +36,11 @@ HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
+RING_RADIUS, HOLE_RADIUS = 6.5, 4.5
 """Sizes in pixels at a resolution scale of 1."""
 
 DISC_SIDES = 20
-"""Number of sides of the polygon that shows a point."""
+"""Number of sides of the disc that shows a control point, and of the ring of a via point."""
 
 OUTLINE = (0.05, 0.05, 0.05)
 """Dark colour under every line and point, so that they stand out from any theme colour."""
@@ -48,7 +48,7 @@ OUTLINE = (0.05, 0.05, 0.05)
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Points, (k, 3), and line, (n, 3), in the local space of a mesh object.
+    """Points, (k, 3), via points, (m, 3), and line, (n, 3), in the local space of a mesh object.
 
     `corners`, (k,), tells which of the points are corners.
     """
@@ -57,6 +57,7 @@ class _Drawn:
     surface: Surface
     points: np.ndarray
     corners: np.ndarray
+    via: np.ndarray
     line: np.ndarray
     problem: str = ""
     radius: float = 0.0
@@ -82,19 +83,18 @@ class _State:
 _state = _State()
 
 
-def show_dragged(
-    opened: Opened, points: ControlPoints, curve: SurfaceCurve | None, problem: str = ""
-) -> None:
-    """Draw a curve that is being changed instead of the active one."""
+def show_dragged(edited: Opened, curve: SurfaceCurve | None, problem: str = "") -> None:
+    """Draw a curve that is being changed, with its changed points, instead of the active one."""
     _state.hover = None
     _state.dragged = _Drawn(
-        opened.mesh_uid,
-        opened.surface,
-        edited_curve.positions_of(opened.surface, points),
-        points.corners,
-        edited_curve.polyline_of(opened.surface, curve),
+        edited.mesh_uid,
+        edited.surface,
+        edited.positions(),
+        edited.points.corners,
+        edited.via_positions(),
+        edited_curve.polyline_of(edited.surface, curve),
         problem,
-        _radius_of(opened),
+        radius_of(edited),
     )
 
 
@@ -132,9 +132,16 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
-    points, line, radius = opened.positions(), opened.polyline(), _radius_of(opened)
-    corners = opened.points.corners
-    return _Drawn(opened.mesh_uid, opened.surface, points, corners, line, "", radius)
+    return _Drawn(
+        opened.mesh_uid,
+        opened.surface,
+        opened.positions(),
+        opened.points.corners,
+        opened.via_positions(),
+        opened.polyline(),
+        "",
+        radius_of(opened),
+    )
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
@@ -144,7 +151,8 @@ def _hover_on(drawn: _Drawn) -> picking.Hit | None:
     return hit if marks else None
 
 
-def _radius_of(opened: Opened) -> float:
+def radius_of(opened: Opened) -> float:
+    """How far the curve object reaches from its line; see `picking.radius_of`."""
     curve = opened.curve_object
     return 0.0 if curve is None else picking.radius_of(curve, opened.surface)
 
@@ -154,24 +162,29 @@ def _draw_lines() -> None:
     drawn = _drawn_now(context)
     if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
-    colours = _Colours(context)
-    nearer = _towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
+    colours = Colours(context)
+    nearer = towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
     if len(drawn.line):
         colour = colours.problem if drawn.problem else colours.line
-        _draw_line(context, nearer, _line_batch(drawn.line), colour)
+        draw_line(context, nearer, _line_batch(drawn.line), colour)
     hit = _hover_on(drawn)
     if hit is not None and hit.kind is Kind.CURVE:
         for line in picking.other_lines(context):
             if line.name == hit.name and len(line.positions) > 1:
-                nearer = _towards_the_eye(
+                nearer = towards_the_eye(
                     context.region_data, mesh_object, drawn.surface, line.radius
                 )
-                _draw_line(context, nearer, _batch(line.positions), colours.hover)
+                draw_line(context, nearer, batch_of_line(line.positions), colours.hover)
 
 
-def _draw_line(
-    context: bpy.types.Context, matrix: Matrix, batch: gpu.types.GPUBatch, colour: Colour
+def draw_line(
+    context: bpy.types.Context,
+    matrix: Matrix,
+    batch: gpu.types.GPUBatch,
+    colour: Colour,
+    line_width: float = LINE_WIDTH,
 ) -> None:
+    """Draw a line with an outline; parts that the mesh hides are dimmed."""
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region, scale = context.region, context.preferences.system.ui_scale
     hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
@@ -181,7 +194,7 @@ def _draw_line(
         gpu.matrix.load_matrix(matrix)
         shader.bind()
         shader.uniform_float("viewportSize", (region.width, region.height))
-        for width, shade in ((LINE_WIDTH + 2.0 * OUTLINE_WIDTH, OUTLINE), (LINE_WIDTH, colour)):
+        for width, shade in ((line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)):
             shader.uniform_float("lineWidth", width * scale)
             for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", 1.0)):
                 gpu.state.depth_test_set(test)
@@ -194,11 +207,12 @@ def _draw_line(
 def _line_batch(line: np.ndarray) -> gpu.types.GPUBatch:
     """The batch of the active line, rebuilt only if the line has changed."""
     if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
-        _state.batch, _state.batch_of = _batch(line), line
+        _state.batch, _state.batch_of = batch_of_line(line), line
     return _state.batch
 
 
-def _batch(line: np.ndarray) -> gpu.types.GPUBatch:
+def batch_of_line(line: np.ndarray) -> gpu.types.GPUBatch:
+    """The batch of a line, (n, 3), for `draw_line`."""
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     return batch_for_shader(shader, "LINE_STRIP", {"pos": line.astype(np.float32)})
 
@@ -209,17 +223,18 @@ def _draw_points() -> None:
     if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)
-    colours = _Colours(context)
-    positions, corners, marked = drawn.points, drawn.corners, -1
-    fills = [colours.point] * len(positions)
+    colours = Colours(context)
+    positions, marked = np.concatenate([drawn.points, drawn.via]), -1
+    fills, n_points = [colours.point] * len(positions), len(drawn.points)
     hit = _hover_on(drawn)
     if hit is not None:
-        if hit.kind is Kind.POINT and hit.index < len(positions):
+        if hit.kind is Kind.POINT and hit.index < n_points:
             fills[hit.index] = colours.hover
+        elif hit.kind is Kind.VIA and hit.index < len(drawn.via):
+            fills[n_points + hit.index] = colours.hover
         elif hit.kind in {Kind.LINE, Kind.SURFACE}:
             marked = len(positions)
             positions = np.concatenate([positions, [hit.position]])
-            corners = np.append(corners, False)
             fills.append(colours.hover)
     if not len(positions):
         return
@@ -230,12 +245,14 @@ def _draw_points() -> None:
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
         opacity = 1.0 if visible[number] else HIDDEN
         size = 0.6 if number == marked else 1.0  # smaller where a click would add a point
-        shape = _SQUARE if corners[number] else _DISC
-        for radius, colour in (
-            (POINT_RADIUS + OUTLINE_WIDTH, OUTLINE),
-            (POINT_RADIUS, fills[number]),
-        ):
-            outlines.append(centres[number] + size * scale * radius * shape)
+        if n_points <= number != marked:
+            shapes = _OUTLINED_RING, _RING
+        elif number < n_points and drawn.corners[number]:
+            shapes = _OUTLINED_SQUARE, _SQUARE
+        else:
+            shapes = _OUTLINED_DISC, _DISC
+        for shape, colour in zip(shapes, (OUTLINE, fills[number]), strict=True):
+            outlines.append(centres[number] + size * scale * shape)
             colour_of.append(np.tile((*colour[:3], opacity), (len(shape), 1)))
     if not outlines:
         return
@@ -262,7 +279,7 @@ def _visible(view: View, positions: np.ndarray) -> np.ndarray:
     return _state.visible
 
 
-class _Colours:
+class Colours:
     """Gizmo colours of the theme, which differ from its selection colours."""
 
     def __init__(self, context: bpy.types.Context) -> None:
@@ -271,20 +288,29 @@ class _Colours:
         self.hover, self.problem = tuple(theme.gizmo_primary), tuple(theme.axis_x)
 
 
-def _disc() -> np.ndarray:
-    """Triangles of a disc of radius 1, as consecutive corners, (n, 2)."""
+def _ring(inner: float, outer: float) -> np.ndarray:
+    """Triangles between two circles around the origin, as consecutive corners, (n, 2)."""
     angles = np.linspace(0.0, 2.0 * np.pi, DISC_SIDES + 1)
     rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return np.stack([np.zeros((DISC_SIDES, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
+    (a, b), (c, d) = ((radius * rim[:-1], radius * rim[1:]) for radius in (inner, outer))
+    return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
 
 
-_DISC = _disc()
+def _square(half: float) -> np.ndarray:
+    """Triangles of a square around the origin, as consecutive corners, (6, 2)."""
+    corners = [[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]]
+    return half * np.array(corners, dtype=np.float64)
 
-_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-"""Triangles of the square that shows a corner."""
+
+_DISC = _ring(0.0, POINT_RADIUS)
+_OUTLINED_DISC = _ring(0.0, POINT_RADIUS + OUTLINE_WIDTH)
+_RING = _ring(HOLE_RADIUS, RING_RADIUS)
+_OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, RING_RADIUS + OUTLINE_WIDTH)
+_SQUARE = _square(POINT_RADIUS)
+_OUTLINED_SQUARE = _square(POINT_RADIUS + OUTLINE_WIDTH)
 
 
-def _towards_the_eye(
+def towards_the_eye(
     region_3d: bpy.types.RegionView3D,
     mesh_object: bpy.types.Object,
     surface: Surface,

@@ -37,6 +37,7 @@ class Kind(Enum):
     """Kinds of things that a click can meet."""
 
     POINT = auto()
+    VIA = auto()
     LINE = auto()
     CURVE = auto()
     SURFACE = auto()
@@ -53,8 +54,9 @@ class Hit:
     name : str
         Name of the curve object; empty for a new curve.
     index : int
-        Index of the control point; on the line, index of the control point before which a new one
-        is inserted; on the surface, number of control points; 0 for another curve.
+        Index of the control point or of the via point; on the line, index of the control point
+        before which a new one is inserted; on the surface, number of control points; 0 for another
+        curve.
     position : tuple
         Position in the local space of the mesh object.
     mesh_uid : int
@@ -211,6 +213,10 @@ def _hit(
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
     if number is not None:
         return Hit(Kind.POINT, name, number, tuple(positions[number]), opened.mesh_uid)
+    via = opened.via_positions()
+    number = view.nearest_point(pixel, via, POINT_REACH * scale)
+    if number is not None:
+        return Hit(Kind.VIA, name, number, tuple(via[number]), opened.mesh_uid)
     reach = CURVE_REACH * scale
     radius = 0.0 if curve is None else radius_of(curve, opened.surface)
     if opened.curve is not None:

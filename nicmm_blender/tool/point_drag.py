@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drags a control point with the mouse button pressed, while the curve follows.
+"""Drags a control point or a via point with the mouse button pressed, while the curve follows.
 
 The operator is modal only until the button is released. Esc or a right click leaves everything as
 it was.
@@ -8,6 +8,7 @@ it was.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bpy
@@ -70,13 +71,16 @@ class PointDrag(ChangesPoints):
         on_screen = self._view.project(positions)[0]
         if np.isfinite(on_screen).all():
             self._grip = on_screen - pixel
-        self._is_new = len(self.changed(self._opened)) > len(self._opened.points)
-        requests = edited_curve.request(self._opened, self.changed(self._opened))
-        self._live = LiveCurve(requests[0]) if requests else None
+        edited = self.edited(self._opened)
+        self._is_new = _count(edited) > _count(self._opened)
+        requests = edited_curve.request(edited, edited.points)
+        if requests:  # until there is another curve, the present one is shown
+            shown = replace(requests[0], start=self._opened.curve)
+            self._live = LiveCurve(shown, keeps_course=not self.searches_course)
         self._preview = _Preview(self._opened)
         self._last_move = 0.0
         if self._live is not None and self._is_new:
-            self._live.move(self.changed(self._opened))
+            self._live.move(edited.points)
         self._show_drag()  # may fail, so it comes before everything that has to be undone then
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
@@ -136,7 +140,7 @@ class PointDrag(ChangesPoints):
         self._stop_scratch()
         self.dragged = place
         if self._live is not None:
-            self._live.move(self.changed(self._opened))
+            self._live.move(self.edited(self._opened).points)
         self._show_drag()
 
     def _work_on(self) -> None:
@@ -148,7 +152,8 @@ class PointDrag(ChangesPoints):
             if time.monotonic() - self._last_move < PAUSE:
                 return
             if self._scratch is None:
-                requests = edited_curve.request(self._opened, self.changed(self._opened))
+                edited = self.edited(self._opened)
+                requests = edited_curve.request(edited, edited.points)
                 self._scratch = time_slices.Work(lambda progress: answer_all(requests, progress))
             if not self._scratch.run_slice(TIME_SLICE):
                 return
@@ -162,11 +167,10 @@ class PointDrag(ChangesPoints):
         self._show_drag()
 
     def _show_drag(self) -> None:
-        points = self.changed(self._opened)
-        live = self._live
+        edited, live = self.edited(self._opened), self._live
         curve = None if live is None else live.curve
         problem = "" if live is None else live.problem
-        overlay.show_dragged(self._opened, points, curve, problem)
+        overlay.show_dragged(edited, curve, problem)
         if live is not None and curve is not None and live.request.start is not self._opened.curve:
             self._preview.show(curve)
         redraw()
@@ -179,10 +183,10 @@ class PointDrag(ChangesPoints):
         if not moved and not self._is_new:
             self._end_drag(context)
             return {"CANCELLED"}
-        self._points = self.changed(opened)
+        self._edited = edited = self.edited(opened)
         place = self.place(opened)
         self.position = opened.surface.points(place.faces, place.barycentric)[0]
-        requests = edited_curve.request(opened, self._points)
+        requests = edited_curve.request(edited, edited.points)
         design = None
         if live is not None and not live.waiting and not live.problem:
             # Keep the curve that the user sees: go on from it, or take it if it has converged.
@@ -198,7 +202,7 @@ class PointDrag(ChangesPoints):
         if design is not None:
             return self.end(context, requests, [design])
         # The points stay visible during a long computation.
-        overlay.show_dragged(self._opened, self._points, self._opened.curve)
+        overlay.show_dragged(self._edited, self._opened.curve)
         result: set[str] = set()
         try:
             result = self.answer(context, requests)
@@ -225,6 +229,11 @@ class PointDrag(ChangesPoints):
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
         redraw()
+
+
+def _count(opened: Opened) -> int:
+    """The number of control points and via points."""
+    return len(opened.points) + len(opened.via)
 
 
 class _Preview:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators that change single control points, and those that activate or end a curve.
+"""The operators that change single points of a curve, and those that activate or end a curve.
 
 Each has a full `execute` and is one undo step. The only state is the curve object with its record.
 """
+
+from typing import TYPE_CHECKING
 
 import bpy
 
@@ -18,6 +20,9 @@ from . import modes, picking
 from .changes_points import ChangesPoints
 from .point_drag import PointDrag
 
+if TYPE_CHECKING:
+    from ..scene.via_points import ViaPoints
+
 POSITION = bpy.props.FloatVectorProperty(
     name="Position",
     description="Position of the point on the surface in the local space of the mesh object",
@@ -30,6 +35,14 @@ POSITION = bpy.props.FloatVectorProperty(
 INDEX = bpy.props.IntProperty(
     name="Point",
     description="Index of the control point",
+    min=0,
+    options={"SKIP_SAVE"},
+)
+
+
+VIA_INDEX = bpy.props.IntProperty(
+    name="Via Point",
+    description="Index of the via point among all via points of the curve",
     min=0,
     options={"SKIP_SAVE"},
 )
@@ -51,6 +64,9 @@ class NICMM_OT_add_point(PointDrag, bpy.types.Operator):
 
     def changed(self, opened: Opened) -> ControlPoints:
         return edited_curve.with_point(opened.points, len(opened.points), self.place(opened))
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        return edited_curve.via_after_insertion(opened, len(opened.points), self.place(opened))
 
 
 class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
@@ -75,6 +91,9 @@ class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
         if self.index != count:
             self.checked_index(opened)
         return edited_curve.with_point(opened.points, self.index, self.place(opened))
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        return edited_curve.via_after_insertion(opened, self.index, self.place(opened))
 
 
 class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
@@ -106,6 +125,77 @@ class NICMM_OT_remove_point(ChangesPoints, bpy.types.Operator):
 
     def changed(self, opened: Opened) -> ControlPoints:
         return edited_curve.without_point(opened.points, self.checked_index(opened))
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        return opened.via.after_removal(self.index, len(opened.points), opened.settings.closed)
+
+
+class NICMM_OT_add_via_point(PointDrag, bpy.types.Operator):
+    """Add a via point to a leg of a curve, which then takes the course that passes near it"""
+
+    bl_idname = "nicmm.add_via_point"
+    bl_label = "Add Via Point to Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    searches_course = True
+
+    curve: CURVE
+    leg: bpy.props.IntProperty(
+        name="Leg",
+        description="Index of the control point at which the leg begins",
+        min=0,
+        options={"SKIP_SAVE"},
+    )
+    index: bpy.props.IntProperty(
+        name="Index",
+        description="Index of the new via point among all via points of the curve. -1 finds it by "
+        "the position along the leg",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+    position: POSITION
+    from_mouse: PointDrag.FROM_MOUSE
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        place, leg = self.place(opened), edited_curve.checked_leg(opened, self.leg)
+        if self.index < 0:  # once only, so that it stays while the point is dragged
+            self.index = edited_curve.index_of_new_via(opened, leg, place)
+        return opened.via.inserted(self.index, leg, place)
+
+
+class NICMM_OT_move_via_point(PointDrag, bpy.types.Operator):
+    """Move a via point of a curve, which then takes the course that passes near it"""
+
+    bl_idname = "nicmm.move_via_point"
+    bl_label = "Move Via Point on Surface"
+    bl_options = {"REGISTER", "UNDO"}
+
+    searches_course = True
+
+    curve: CURVE
+    index: VIA_INDEX
+    position: POSITION
+    from_mouse: PointDrag.FROM_MOUSE
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        return opened.via.moved(self.checked_via_index(opened), self.place(opened))
+
+
+class NICMM_OT_remove_via_point(ChangesPoints, bpy.types.Operator):
+    """Remove a via point from a curve, and search for its course again"""
+
+    bl_idname = "nicmm.remove_via_point"
+    bl_label = "Remove Via Point from Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    searches_course = True
+
+    curve: CURVE
+    index: VIA_INDEX
+
+    def changed_via(self, opened: Opened) -> "ViaPoints":
+        return opened.via.without(self.checked_via_index(opened))
 
 
 class NICMM_OT_toggle_corner(ChangesPoints, bpy.types.Operator):
@@ -190,6 +280,9 @@ CLASSES = (
     NICMM_OT_move_point,
     NICMM_OT_remove_point,
     NICMM_OT_toggle_corner,
+    NICMM_OT_add_via_point,
+    NICMM_OT_move_via_point,
+    NICMM_OT_remove_via_point,
     NICMM_OT_activate_curve,
     NICMM_OT_end_curve,
 )

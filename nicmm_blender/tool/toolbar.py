@@ -7,7 +7,8 @@ from ..operators import curve_settings
 from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
 from ..scene import mesh_data
-from . import modes
+from . import course_overlay, modes
+from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
 from .point_operators import NICMM_OT_end_curve, NICMM_OT_toggle_corner
 
@@ -22,9 +23,22 @@ KEYMAP = (
         {"properties": [("remove", True)]},
     ),
     (NICMM_OT_toggle_corner.bl_idname, {"type": "J", "value": "PRESS"}, None),
+    (
+        NICMM_OT_draw_on_surface.bl_idname,
+        {"type": "LEFTMOUSE", "value": "PRESS", "shift": True},
+        {"properties": [("via", True)]},
+    ),
     (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
+    *(
+        (NICMM_OT_choose_course.bl_idname, {"type": key, "value": "PRESS", **held}, values)
+        for key in ("RET", "NUMPAD_ENTER")
+        for held, values in (
+            ({"shift": True}, None),
+            ({"shift": True, "ctrl": True}, {"properties": [("under_mouse", True)]}),
+        )
+    ),
 )
 """Mouse buttons and keys of the tool.
 
@@ -37,7 +51,10 @@ HINTS = (
     (("MOUSE_LMB_DRAG",), "Move Point"),
     (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
     (("EVENT_J",), "Toggle Corner"),
+    (("EVENT_SHIFT", "MOUSE_LMB_DRAG"), "Via Point on Curve"),
     (("EVENT_RETURN",), "End Curve"),
+    (("EVENT_SHIFT", "EVENT_RETURN"), "Choose Course"),
+    (("EVENT_CTRL", "EVENT_SHIFT", "EVENT_RETURN"), "Choose Course of Leg"),
 )
 
 
@@ -61,6 +78,9 @@ class _SurfaceCurve:
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)
             layout.operator(NICMM_OT_next_course.bl_idname)
+            choosing = layout.row()
+            choosing.operator_context = "INVOKE_REGION_WIN"  # the mouse is used in the viewport
+            choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness", "normal_bending"):
@@ -91,7 +111,7 @@ TOOLS = (NICMM_WT_object, NICMM_WT_sculpt, NICMM_WT_weights)
 
 def draw_hints(header: bpy.types.Header, context: bpy.types.Context) -> None:
     """Draw the tool's mouse buttons and keys at the start of the status bar."""
-    if not modes.is_tool_active(context):
+    if not modes.is_tool_active(context) or course_overlay.is_shown():
         return
     row = header.layout.row(align=False)
     for icons, text in HINTS:

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 OFFSET = 2e-3
 """Offset towards the eye for drawing and visibility tests, relative to the mesh diagonal."""
 
+SAMPLES, LABEL_CANDIDATES = 256, 64
+"""Points of a line at which its distance from others is measured, and places for its label."""
+
+LABEL_ROOM = 12.0
+"""Distance in pixels from other lines at which a label clearly belongs to its line."""
+
 BEHIND = 1e-7
 """Step past a hidden face, relative to the rest of the line of sight."""
 
@@ -143,6 +149,33 @@ class View:
             return None
         best = int(near[away[near].argmin()])
         return best, float(share[best])
+
+    def label_places(self, lines: list[np.ndarray]) -> np.ndarray:
+        """Pixels for a label beside each polyline, (n, 2); NaN if no part of a line is in view.
+
+        They are where a line is farthest from the others and from earlier labels, on a visible part
+        unless it runs beside another line there.
+        """
+        samples = [
+            line[np.linspace(0, len(line) - 1, min(len(line), SAMPLES)).astype(int)]
+            for line in lines
+        ]
+        flat = [self.project(each) for each in samples]
+        places = np.full((len(lines), 2), np.nan)
+        for number, sample in enumerate(samples):
+            step = max(len(sample) // LABEL_CANDIDATES, 1)
+            pixels = flat[number][::step]
+            inside = ((pixels >= 0.0) & (pixels <= self.size)).all(axis=1)
+            if not inside.any():
+                continue
+            others = [other for each, other in enumerate(flat) if each != number]
+            there = np.concatenate([*others, places])
+            there = there[np.isfinite(there).all(axis=1)]
+            away = np.linalg.norm(pixels[:, None] - there, axis=2).min(axis=1, initial=np.inf)
+            clear = inside & (away > LABEL_ROOM) & self.visible(sample[::step])
+            away[~(clear if clear.any() else inside)] = -1.0
+            places[number] = pixels[away.argmax()]
+        return places
 
     def _in_pixels(self, positions: np.ndarray, radius: float) -> np.ndarray:
         """Size in pixels, (n,), of a length parallel to the screen at each position."""

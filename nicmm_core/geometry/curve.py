@@ -112,6 +112,52 @@ def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
+def points_of_leg(curve: SurfaceCurve, leg: int) -> IntArray:
+    """Indices of the points of a leg, from its control point to the next one, both included."""
+    index, count = curve.control_index, len(curve.faces)
+    start, end = index[leg], index[(leg + 1) % len(index)]
+    return np.arange(start, end + count * (curve.closed and end <= start) + 1) % count
+
+
+def with_other_leg(
+    mesh: Mesh, curve: SurfaceCurve, leg: int, replacement: SurfaceCurve
+) -> SurfaceCurve:
+    """A curve with one leg replaced by an open curve through the same two control points.
+
+    A closed curve then begins at the control point at which the leg begins.
+    """
+    first, last = replacement.control_index
+    new, taken = np.arange(first, last), points_of_leg(curve, leg)
+    start, length = taken[0], len(taken) - 1
+    before = np.arange(0 if curve.closed else start)
+    rest = len(curve.faces) - length - len(before)
+    after = (taken[-1] + np.arange(rest)) % len(curve.faces)
+    parts = ((curve, before), (replacement, new), (curve, after))
+    index = curve.control_index
+    if curve.closed:
+        index = (index - start) % len(curve.faces)
+    moves = index >= len(before) + length
+    return curve_on_mesh(
+        mesh,
+        curve.closed,
+        np.concatenate([each.faces[points] for each, points in parts]),
+        np.concatenate([each.barycentric[points] for each, points in parts]),
+        index + np.where(moves, len(new) - length, 0),
+    )
+
+
+def along_leg(curve: SurfaceCurve, leg: int, positions: FloatArray) -> FloatArray:
+    """How far along a leg the nearest point to each position, (k, 3), is, counted in segments."""
+    line = curve.points[points_of_leg(curve, leg)]
+    start, step = line[:-1], np.diff(line, axis=0)
+    squared = np.maximum((step * step).sum(axis=1), np.finfo(np.float64).tiny)
+    share = ((positions[:, None] - start) * step).sum(axis=2) / squared
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(start + share[:, :, None] * step - positions[:, None], axis=2)
+    nearest = away.argmin(axis=1)
+    return nearest + np.take_along_axis(share, nearest[:, None], axis=1)[:, 0]
+
+
 def checked_curve(
     mesh: Mesh, curve: SurfaceCurve, across_gaps: bool = False
 ) -> tuple[SurfaceCurve, IntArray]:

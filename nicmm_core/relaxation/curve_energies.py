@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .curve_nodes import CurveSurface
 from .discrete_curve import DiscreteCurve
@@ -20,6 +21,23 @@ def energies_of(
     return [
         float(comparable_energies(surface, curve.nodes, smoothness, scale)[0]) for curve in curves
     ]
+
+
+def relative_energies(
+    surface: CurveSurface,
+    curves: Sequence[DiscreteCurve],
+    smoothness: float,
+    length_scale: float | None = None,
+) -> list[float]:
+    """Energies relative to the least of them, so all are at least 1.
+
+    Differences are divided by the least energy without maps, since with lanes it may be negative.
+    """
+    energies = energies_of(surface, curves, smoothness, length_scale)
+    best = energies.index(min(energies))
+    unpainted = replace(surface, feature_map=None)
+    (unit,) = energies_of(unpainted, [curves[best]], smoothness, length_scale)
+    return [1.0 + (energy - energies[best]) / unit for energy in energies]
 
 
 def scaled_bending(curve: DiscreteCurve) -> float:

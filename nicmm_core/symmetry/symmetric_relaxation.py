@@ -16,7 +16,7 @@ from ..geometry.curve import SurfaceCurve
 from ..geometry.surface_points import nearest_points
 from ..improvement import KINKED, relaxation_config
 from ..progress import CancelledError
-from ..relaxation.curve_energies import energies_of, scaled_bending
+from ..relaxation.curve_energies import energies_of, relative_energies, scaled_bending
 from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.elastic_energy import bending_energy, feature_energy
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
@@ -56,6 +56,9 @@ MOST_RELAXED = 2
 
 PROMISING = 30.0
 """Energy above that of the best symmetric curve up to which a start may lead to a better one."""
+
+ComparedCurve = tuple[InitialCurve, Relaxed, float]
+"""A relaxed curve with its start, and its energy relative to that of the best curve."""
 
 Relax = Callable[[InitialCurve, RelaxationConfig], Relaxed]
 """Relaxes a start with some settings."""
@@ -222,7 +225,7 @@ def best_symmetric(
     begins: list[SymmetricCurve],
     relax: Relax,
     most_iterations: int | None,
-) -> tuple[list[tuple[InitialCurve, Relaxed]], bool]:
+) -> tuple[list[ComparedCurve], bool]:
     """Relax the best of some symmetric curves.
 
     Parameters
@@ -235,7 +238,7 @@ def best_symmetric(
 
     Returns
     -------
-    list of (InitialCurve, Relaxed)
+    list of ComparedCurve
         Distinct symmetric curves by ascending energy.
     bool
         Whether the caller has stopped it.
@@ -269,5 +272,6 @@ def best_symmetric(
             break
     curves = [each.discrete_curve for each in relaxed]
     order = distinct_by_energy(starts[0].surface, curves, energies)
+    relative = relative_energies(starts[0].surface, curves, request.smoothness, scale)
     cancelled = relaxed[-1].status is Status.CANCELLED
-    return [(starts[i], relaxed[i]) for i in order], cancelled
+    return [(starts[i], relaxed[i], relative[i]) for i in order], cancelled

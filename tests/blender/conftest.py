@@ -120,6 +120,8 @@ def _key(value):
     """A hashable value that is the same for equal arguments of a design."""
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()
+    if isinstance(value, dict):
+        return _key(sorted(value.items()))
     if isinstance(value, tuple | list):
         return tuple(_key(each) for each in value)
     if hasattr(value, "__dataclass_fields__"):

@@ -142,7 +142,7 @@ def test_methods_keep_the_numbers_that_files_store(extension):
 def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
-    of_scripts = {"points", "point_group", "corners"}
+    of_scripts = {"points", "point_group", "corners", "via_points"}
     assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
 
 
@@ -184,7 +184,7 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
     editing = bpy.ops.nicmm.edit_curve.get_rna_type().properties
     recorded = {}
     for option in table.OPTIONS:
-        if option.kind in table.OF_POINTS:
+        if option.kind in table.COMPOUND_KINDS:
             continue
         name = record.property_name(option)
         assert designing[name].name == option.label

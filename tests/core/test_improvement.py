@@ -48,3 +48,23 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
         ).energies
 
     assert energies(3)[:2] == energies(2)
+
+
+@pytest.mark.parametrize("smoothness", [1.0, 0.5])
+def test_alternatives_tell_their_energy_relative_to_the_fairest_curve(ball, smoothness):
+    design = nicmm.design_curve(ball, [3, 200, 400, 611], alternatives=4, smoothness=smoothness)
+    designs = [design, *design.alternatives]
+    assert len(designs) > 2
+    found = [each.resumable.curve for each in designs]
+    energies = np.array(energies_of(curve_surface(design.resumable.mesh), found, smoothness))
+    relative = [each.relative_energy for each in designs]
+    assert relative[0] == 1.0 and relative == sorted(relative)
+    # Energies depend on a length scale, here the least length and there that of the first attempt.
+    np.testing.assert_allclose(relative, energies / energies[0], rtol=0.2)
+
+
+def test_relative_energies_are_at_least_one_with_maps(ball):
+    lane = np.exp(-((ball.vertices[:, 2] / 0.1) ** 2))
+    design = nicmm.design_curve(ball, [3, 200, 400, 611], alternatives=4, alignment=lane)
+    relative = [each.relative_energy for each in (design, *design.alternatives)]
+    assert len(relative) > 1 and relative[0] == 1.0 and relative == sorted(relative)

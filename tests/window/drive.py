@@ -624,7 +624,7 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 6, f"six items in {name}")
+        check(len(items) == 11, f"eleven items in {name}")
         letters = [kind for _, kind, _ in items if len(kind) == 1]
         check(letters == ["J"], f"one letter in {name}")
     for config in ("Industry_Compatible", "Blender"):
@@ -661,6 +661,151 @@ def keys(blender: Blender) -> None:
     check(blender.do(f"value = {rotation}") != turned, "the view is turned")
     check(state(blender) == before, "no point is added")
     blender.do("bpy.context.preferences.inputs.use_mouse_emulate_3_button = False")
+
+
+def courses(blender: Blender) -> None:
+    """Choose Course: the preview, with keys, wheel and mouse; cancel and undo."""
+    step("Five points, and Choose Course with Shift Enter")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
+    before = state(blender)
+    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    blender.move(beside)
+    begin_choice(blender)
+    blender.shot("18-courses")
+    count, first = blender.do("value = helper.courses()")
+    check(count > 1, "several courses")
+
+    def wait_for(number: int, why: str) -> None:
+        blender.wait(f"helper.courses() == [{count}, {number % count}]", why)
+
+    step("Wheel, arrow keys and Shift Enter change the choice; Esc cancels")
+    blender.mouse("click", 5)
+    wait_for(first + 1, "the wheel")
+    blender.key("Down")
+    wait_for(first + 2, "an arrow key")
+    blender.key("shift+Return")
+    wait_for(first + 3, "Shift Enter")
+    for step_back in (2, 1):
+        blender.key("Up")
+        wait_for(first + step_back, "an arrow key back")
+    blender.shot("4-choose-course")
+    check(state(blender) == before, "nothing changes during the choice")
+    blender.key("Escape")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    check(state(blender) == before, "Esc changes nothing")
+
+    step("A click chooses a course; Enter confirms; one undo step")
+    begin_choice(blender)
+    other, pixel = blender.do("value = helper.another_course()")
+    blender.click(pixel)
+    wait_for(other, "the course under the mouse")
+    blender.key("Return")
+    blender.wait(f"helper.state() != {before!r}", "the chosen course")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    count_points(blender, len(PLACES))
+    blender.shot("18-chosen-course")
+    undo_and_redo(blender, [before, state(blender)], "of the choice")
+
+    step("Ctrl Shift Enter shows the courses of the leg under the mouse")
+    before = state(blender)
+    points = blender.do("value = helper.places()")
+    for leg in range(len(PLACES)):  # some have no other course
+        blender.move(blender.do(f"value = helper.pixels(helper.middle_of_leg({leg}))")[0])
+        time.sleep(0.5)
+        blender.key("ctrl+shift+Return")
+        time.sleep(0.5)
+        blender.wait("not helper.is_in_time_slices()", "the search")
+        time.sleep(0.5)
+        if blender.do("value = helper.courses()"):
+            break
+    check(blender.do("value = helper.courses()") is not None, "another course of a leg")
+    blender.mouse("click", 5)
+    blender.shot("18-leg")
+    blender.key("Return")
+    blender.wait(f"helper.state() != {before!r}", "another course of the leg")
+    blender.wait("not helper.is_modal()", "the end of the choice")
+    check(blender.do("value = helper.places()") == points, "the points stay")
+    blender.shot("18-leg-chosen")
+    undo_and_redo(blender, [before, state(blender)], "of the course of a leg")
+    blender.move(beside)
+    blender.key("ctrl+shift+Return")
+    time.sleep(1.0)
+    check(not blender.do("value = helper.is_modal()"), "beside the curve there is no choice")
+
+
+def via_points(blender: Blender) -> None:
+    """Via points: Shift-drag from the curve, drag one again, Ctrl-click; Esc and undo."""
+    step("Two points on an open curve; Shift-drag from the curve adds a via point")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do("bpy.context.scene.nicmm_curves.closed = False")
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    ends = blender.do("value = helper.in_front([(-0.42, 0.62), (0.42, 0.62)])")
+    states = click_places(blender, ends)
+    plain = states[-1]
+    count = "len(helper.curve()['nicmm_curve'].get('via_legs', []))"
+    (on_curve,) = blender.do("value = helper.pixels([helper.line()[len(helper.line()) // 2]])")
+    muzzle, mouth = blender.do("value = helper.pixels(helper.in_front([(0, -0.45), (0, -0.75)]))")
+    shift_drag(blender, on_curve, 10, part_of_way(on_curve, muzzle, 10), "19-via-dragged")
+    blender.mouse("mouseup", 1)
+    blender.mouse("keyup", "shift")
+    blender.wait(f"{count} == 1", "the via point")
+    blender.wait("not helper.is_modal()", "the curve near the via point")
+    count_points(blender, 2)
+    added = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("19-via-point")
+    step("Esc during a drag of the via point changes nothing; then drag it")
+    (ring,) = blender.do("value = helper.pixels(helper.via_places())")
+    drag(blender, ring, 10, (3.0, -6.0))
+    blender.key("Escape")
+    time.sleep(0.5)
+    blender.mouse("mouseup", 1)
+    time.sleep(0.5)
+    check(state(blender) == added, "Esc changes nothing")
+    drag(blender, ring, 10, part_of_way(ring, mouth, 10))
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {added!r}", "the moved via point")
+    blender.wait("not helper.is_modal()", "the curve near the via point")
+    moved = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("4-via-point")
+    step("Ctrl-click removes it; undo and redo")
+    (ring,) = blender.do("value = helper.pixels(helper.via_places())")
+    blender.click(ring, "ctrl")
+    blender.wait(f"{count} == 0", "the via point is removed")
+    blender.wait("not helper.is_modal()", "the curve without it")
+    undo_and_redo(blender, [plain, added, moved, state(blender)], "of via points")
+    step("Shift-click beside the curve adds nothing")
+    before = state(blender)
+    (middle,) = blender.do("value = helper.pixels(helper.in_front([(0.0, -0.2)]))")
+    blender.click(middle, "shift")
+    time.sleep(1.0)
+    check(state(blender) == before, "no point is added")
+    blender.do("bpy.context.scene.nicmm_curves.closed = True")
+
+
+def shift_drag(blender: Blender, start, steps: int, each, name: str) -> None:
+    """Hold Shift and drag; both stay pressed."""
+    blender.move(start)
+    blender.mouse("keydown", "shift")
+    time.sleep(HOLD)
+    drag(blender, start, steps, each, name)
+
+
+def part_of_way(start, end, steps: int) -> tuple[float, float]:
+    """One of equal steps from a pixel to another."""
+    return (end[0] - start[0]) / steps, (end[1] - start[1]) / steps
+
+
+def begin_choice(blender: Blender) -> None:
+    blender.key("shift+Return")
+    blender.wait("helper.courses() is not None", "the courses")
 
 
 def large(blender: Blender) -> None:
@@ -829,6 +974,8 @@ PARTS = {
     "methods": methods,
     "convert": convert,
     "keys": keys,
+    "courses": courses,
+    "via": via_points,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

@@ -18,7 +18,8 @@ import bpy
 import numpy as np
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-MODULE = "bl_ext.user_default.nicmm_curves.nicmm_blender"
+EXTENSION = "bl_ext.user_default.nicmm_curves"
+MODULE, CORE = f"{EXTENSION}.nicmm_blender", f"{EXTENSION}.nicmm_core"
 
 
 class Helper:
@@ -308,10 +309,27 @@ class Helper:
         return np.flatnonzero(cls.curve()["nicmm_curve"]["corner_points"]).tolist()
 
     @classmethod
+    def via_places(cls):
+        """Via points of the active curve in the mesh's local space."""
+        return np.array(cls.curve()["nicmm_curve"]["via_positions"]).reshape(-1, 3).tolist()
+
+    @classmethod
     def line(cls):
         """Points of the active curve object."""
         splines = cls.curve().data.splines
         return [list(point.co[:3]) for spline in splines for point in spline.points]
+
+    @classmethod
+    def middle_of_leg(cls, leg):
+        """The visible point of a leg of the active curve that is nearest to its middle."""
+        with cls.in_view():
+            picking = import_module(f"{MODULE}.tool.picking")
+            opened = picking.opened_now(bpy.context)
+            view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
+        core = import_module(f"{CORE}.geometry.curve")
+        line = opened.polyline()[core.points_of_leg(opened.curve, leg)]
+        seen = np.flatnonzero(view.visible(line))
+        return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
     @classmethod
     def state(cls):
@@ -326,6 +344,36 @@ class Helper:
                 ]
                 found.append((each.name, sorted(record.items()), splines))
         return hashlib.sha1(repr(found).encode()).hexdigest()
+
+    @staticmethod
+    def courses():
+        """The number of courses among which the user chooses, and the chosen one; or None."""
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        return shown and [len(shown.courses), shown.chosen]
+
+    @classmethod
+    def another_course(cls):
+        """A course that is not chosen, and a pixel of the screen where a click chooses it.
+
+        Of courses that share a leg, a click chooses the fairest.
+        """
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        region, opened = cls.region(), shown.opened
+        with cls.in_view():
+            picking = import_module(f"{MODULE}.tool.picking")
+            view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
+        for line in shown.lines:
+            for pixel in np.round(view.project(line[view.visible(line)])):
+                under = [
+                    each
+                    for each, other in enumerate(shown.lines)
+                    if view.nearest_on_line(pixel, other, 2.0 * picking.CURVE_REACH) is not None
+                ]
+                if under and shown.chosen not in under:
+                    x, y = pixel.tolist()
+                    place = [region.x + x, bpy.context.window.height - 1 - (region.y + y)]
+                    return min(under), place
+        raise ValueError("the chosen course is everywhere")
 
     @staticmethod
     def keymap(name):

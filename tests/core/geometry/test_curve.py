@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nicmm_core.geometry.curve import curve_on_mesh, resample
+from nicmm_core import SurfaceCurve
+from nicmm_core.geometry.curve import along_leg, curve_on_mesh, points_of_leg, resample
 from tests.core.checks import circle, random_surface_points
 from tests.oracles.geodesic_curvature import geodesic_curvature
 
@@ -105,3 +106,22 @@ def test_length_and_steps_of_closed_and_open_curves(ball):
     assert closed.steps.shape == (5, 3) and opened.steps.shape == (4, 3)
     np.testing.assert_allclose(closed.steps.sum(axis=0), 0.0, atol=1e-15)
     np.testing.assert_allclose(closed.points, place, rtol=0, atol=1e-15)
+
+
+@pytest.fixture
+def square():
+    """A closed curve around a square of side 2, with points at corners and middles of sides."""
+    sides = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1]], dtype=float)
+    points = np.concatenate([sides, np.zeros((8, 1))], axis=1)
+    return SurfaceCurve(True, np.zeros(8, int), np.zeros((8, 3)), points, np.array([1, 3, 6]))
+
+
+@pytest.mark.parametrize(("leg", "points"), [(0, [1, 2, 3]), (1, [3, 4, 5, 6]), (2, [6, 7, 0, 1])])
+def test_points_of_a_leg_include_both_control_points(square, leg, points):
+    assert points_of_leg(square, leg).tolist() == points
+
+
+def test_positions_along_a_leg_are_those_of_the_nearest_points(square):
+    positions = np.array([[-0.5, 1.5, 0.0], [0.25, -0.25, 0.0], [0.0, 3.0, 0.0], [9.0, 0.0, 0.0]])
+    np.testing.assert_allclose(along_leg(square, 2, positions), [0.5, 2.25, 0.0, 3.0])
+    assert len(along_leg(square, 0, np.zeros((0, 3)))) == 0
