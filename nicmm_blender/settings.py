@@ -36,11 +36,11 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name; options for points are left out."""
+    """Blender properties for core options, by property name, without those for points and for curves."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
-        if option.kind is not Kind.POINTS
+        if option.kind not in (Kind.POINTS, Kind.CURVES)
     }
 
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -40,7 +40,8 @@ from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
-from .repaired_surface import Manifold, RepairedSurface, is_on, start_on
+from .repair.off_curves import Avoided, avoided_curves, check_not_crossed
+from .repaired_surface import Manifold, RepairedSurface, SurfaceOffCurves, is_on, start_on
 from .request import Request, same_request
 from .status import Status
 
@@ -79,6 +80,7 @@ class Designer:
             )
         self.mesh = mesh
         self._free: _Free | None = None  # of the last request with obstacles
+        self._off_curves: SurfaceOffCurves | None = None  # of the last one with curves to avoid
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
 
@@ -93,6 +95,7 @@ class Designer:
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
+        avoid: Sequence[SurfaceCurve | Design] | None = None,
         smoothness: float = 1.0,
         alternatives: int = 0,
         start: Design | SurfaceCurve | None = None,
@@ -121,8 +124,8 @@ class Designer:
         Raises
         ------
         CurveError
-            If the start lies on another mesh, enters an obstacle, is too far from the control
-            points, or would cross itself when moved to them.
+            If the start lies on another mesh, enters an obstacle, meets a curve of `avoid`, is too
+            far from the control points, or would cross itself when moved to them.
         """
         started = time.perf_counter()
         given = {
@@ -133,6 +136,7 @@ class Designer:
             "smoothness": smoothness,
             "obstacles": obstacles,
             "clearance": clearance,
+            "avoid": avoid,
             "alignment": alignment,
             "alternatives": alternatives,
         }
@@ -153,7 +157,11 @@ class Designer:
                 begin = None if start is None else start_on(manifold, start)
                 with placed(manifold.in_original):
                     found = manifold.designer.design(there, started, begin, max_iterations)
-                    return manifold.design_on_original(found, points)
+                    design = manifold.design_on_original(found, points)
+                    if request.avoid is not None:
+                        avoided = avoided_curves(self.mesh, request.avoid, points)
+                        design = _check_not_crossed(self.mesh, design, avoided)
+                    return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -175,9 +183,12 @@ class Designer:
     def _on_manifold(self, request: Request) -> tuple[Manifold, Request]:
         """The first manifold that connects the points, and the request on it."""
         surface = self._surface_off_obstacles(request)
-        found = surface.find(request)
+        kept_off = None if request.avoid is None else self._surface_off_curves(surface, request)
+        found = surface.find(request) if kept_off is None else kept_off.find(request)
         if found is not None:
             return found
+        if kept_off is not None:
+            kept_off.check_reachable(request)
         check_connected(self.mesh, request.points)
         if request.via_points:
             with_via_points(
@@ -200,6 +211,35 @@ class Designer:
             surface = self._whole if every else RepairedSurface(self._whole.surfaces, free)
             last = self._free = _Free(obstacles, clearance, surface)
         return last.surface
+
+    def _surface_off_curves(self, surface: RepairedSurface, request: Request) -> SurfaceOffCurves:
+        """The surface off the curves to avoid; it is kept until a request has other curves.
+
+        Control points matter only where they lie on the curves.
+        """
+        assert request.avoid is not None
+        avoided = avoided_curves(self.mesh, request.avoid, request.points)
+        last = self._off_curves
+        if last is None or not last.is_of(surface, avoided, request.clearance):
+            last = self._off_curves = SurfaceOffCurves(surface, avoided, request.clearance)
+        return last
+
+
+def _check_not_crossed(mesh: Mesh, design: Design, avoided: list[Avoided]) -> Design:
+    """A design without alternatives that cross avoided curves.
+
+    Raises
+    ------
+    UnreachableError
+        If the curve of the design itself crosses one of them.
+    """
+    for curve in design.curves:
+        check_not_crossed(mesh, curve, avoided)
+    kept = []
+    for other in design.alternatives:
+        with contextlib.suppress(UnreachableError):
+            kept.append(_check_not_crossed(mesh, other, avoided))
+    return replace(design, alternatives=kept)
 
 
 def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
@@ -241,6 +281,7 @@ def design_curve(
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
+    avoid: Sequence[SurfaceCurve | Design] | None = None,
     smoothness: float = 1.0,
     alternatives: int = 0,
     progress: Progress | None = None,
@@ -272,7 +313,13 @@ def design_curve(
         Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
         a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.
     clearance : float, default 0
-        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
+        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1
+        and from the curves of `avoid`.
+    avoid : list of SurfaceCurve or Design, optional
+        Curves on the mesh that the curve does not cross, and from which it keeps the clearance.
+        Control points on them are junctions, at which the curve ends or passes through; the
+        clearance does not count along an avoided curve up to twice the clearance from a junction.
+        Only with the method "elastic".
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
     alternatives : int, default 0
@@ -290,10 +337,13 @@ def design_curve(
     Raises
     ------
     ControlPointError
-        If there are too few points, or one is repeated, out of range or off the surface.
+        If there are too few points, or one is repeated, out of range or off the surface, or closer
+        to a curve of `avoid` than the clearance without lying on it.
     UnreachableError
         If no simple curve through the points exists on the surface, if every path found winds
-        around itself too often, or if obstacles of weight 1 separate the points.
+        around itself too often, or if obstacles of weight 1 or curves to avoid separate the points.
+    CurveError
+        If a curve of `avoid` does not lie on the mesh.
     ArgumentError
         If another argument cannot be used.
 
@@ -315,6 +365,7 @@ def design_curve(
         obstacles=obstacles,
         alignment=alignment,
         clearance=clearance,
+        avoid=avoid,
         smoothness=smoothness,
         alternatives=alternatives,
         progress=progress,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .geometry.array_types import FloatArray
+from .geometry.curve import SurfaceCurve
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
 
@@ -29,7 +30,9 @@ class Request:
     smoothness : float
     obstacles : (V,) float array or None
     clearance : float
-        Least distance from obstacles of weight 1, in mesh units.
+        Least distance from obstacles of weight 1 and from curves to avoid, in mesh units.
+    avoid : tuple of SurfaceCurve or None
+        Curves on the given mesh that the curve does not cross; they are not mapped.
     alignment : (V,) float array or None
     alternatives : int
         Largest number of further curves along other courses.
@@ -43,6 +46,7 @@ class Request:
     smoothness: float
     obstacles: FloatArray | None
     clearance: float
+    avoid: tuple[SurfaceCurve, ...] | None
     alignment: FloatArray | None
     alternatives: int
 
@@ -85,9 +89,20 @@ def same_maps(one: Request, other: Request) -> bool:
     return _same(one.obstacles, other.obstacles) and _same(one.alignment, other.alignment)
 
 
+def same_curves(
+    one: tuple[SurfaceCurve, ...] | None, other: tuple[SurfaceCurve, ...] | None
+) -> bool:
+    """Whether two lists of curves are equal."""
+    return _same(one, other)
+
+
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
         return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)
+    if isinstance(one, SurfaceCurve) and isinstance(other, SurfaceCurve):
+        return all(_same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, dict):

@@ -75,7 +75,7 @@ NEW_CURVE_OPTIONS = ("order", "alternatives")
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind is not Kind.POINTS and option.name not in NEW_CURVE_OPTIONS
+    if option.kind not in (Kind.POINTS, Kind.CURVES) and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 
@@ -125,7 +125,7 @@ def arguments_of(
             value = value.lower().replace("_", "-")
         values[option.name] = value
     for option in RECORDED:
-        if option.needs and values[option.needs] is None:
+        if option.needs and all(values.get(name) is None for name in option.needs):
             values[option.name] = option.default
     return values
 
