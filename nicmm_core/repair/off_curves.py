@@ -46,12 +46,15 @@ LEVEL = 0.992
 
 The distance that is kept differs from it by up to `SNAP` and about `ERROR`."""
 
-COARSEST = 1.0
-"""Longest edge of the faces that are divided at the clearance, in clearances."""
+COARSEST = 2.0
+"""Greatest longest edge of the faces that are divided at the clearance, in clearances."""
+
+FINEST = 1.0 / 16.0
+"""Length of an edge up to which faces are accurate enough in any case, in clearances."""
 
 ERROR = 0.003
-"""Greatest error of distances that are interpolated on these faces, at their centroids, in
-clearances. Faces with greater errors are bisected further."""
+"""Greatest error of distances that are interpolated on these faces, at their centroids and in the
+middle of their sides, in clearances. Faces with greater errors are bisected further."""
 
 SNAP = 0.008
 """Distance up to which the line at the clearance is moved to a vertex, in clearances."""
@@ -60,7 +63,7 @@ MEETING = 1e-8
 """Greatest distance between a control point and the place at which the curve may meet an avoided
 curve, in bounding-box diagonals."""
 
-REACH = 1.5
+REACH = 3.2
 """Distance up to which distances are computed, in clearances."""
 
 RINGS = 3
@@ -371,15 +374,19 @@ def _beyond(
         checkpoint()
         lengths = _side_lengths(vertices, parts.faces)
         longest, at_corners = lengths.max(axis=1), values[parts.faces]
-        straddles = (at_corners.min(axis=1) <= level + longest) & (
-            at_corners.max(axis=1) >= level - longest
+        large = longest > COARSEST * clearance
+        # On a small face, the line may cross a side without enclosing an end of it; if it is an arc
+        # about a point, it reaches this far into the face.
+        margin = np.where(large, longest, longest**2 / (8.0 * clearance))
+        straddles = (at_corners.min(axis=1) <= level + margin) & (
+            at_corners.max(axis=1) >= level - margin
         )
         straddles &= reached[parts.parent]
-        large = longest > COARSEST * clearance
         check = np.flatnonzero(straddles & ~large & ~accurate)
-        centroids = SurfacePoints(parts.parent[check], parts.corners[check].mean(axis=1))
-        errors = np.abs(at_corners[check].mean(axis=1) - distances.at(centroids))
-        accurate[check] = errors <= ERROR * clearance
+        accurate[check] = _errors(distances, parts.taken(check), at_corners[check]) <= (
+            ERROR * clearance
+        )
+        accurate |= longest <= FINEST * clearance
         straddles &= ~accurate
         if not straddles.any():
             break
@@ -403,6 +410,15 @@ def _evaluated(distances: SegmentDistances, parts: FaceParts, values: FloatArray
     values = values.copy()
     values[vertex] = distances.at(points)
     return values
+
+
+def _errors(distances: SegmentDistances, parts: FaceParts, at_corners: FloatArray) -> FloatArray:
+    """Greatest error of linear interpolation at the centroid and in the middle of sides, (f,)."""
+    shares = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [1 / 3, 1 / 3, 1 / 3]])
+    weights = np.einsum("pc,fcd->fpd", shares, parts.corners).reshape(-1, 3)
+    points = SurfacePoints(parts.parent.repeat(len(shares)), weights)
+    exact = distances.at(points).reshape(-1, len(shares))
+    return np.abs(at_corners @ shares.T - exact).max(axis=1)
 
 
 def _side_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
