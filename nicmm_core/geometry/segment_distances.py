@@ -112,8 +112,8 @@ class SegmentDistances:
 
     @property
     def faces_reached(self) -> BoolArray:
-        """Whether each face has a segment, or a line of at most the limit passes through it, (F,)."""
-        reached = np.zeros(len(self.mesh.faces), dtype=bool)
+        """Whether each face may have points within the limit, (F,)."""
+        reached = (self.at_vertices < self.limit)[self.mesh.faces].any(axis=1)
         reached[self.segments.faces] = reached[self._intervals.side // 3] = True
         return reached
 
