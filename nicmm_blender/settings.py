@@ -36,7 +36,7 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name, without those for points and for curves."""
+    """Blender properties for core options, by property name, except for points and curves."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options

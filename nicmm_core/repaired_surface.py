@@ -210,9 +210,7 @@ class SurfaceOffCurves:
     clearance : float
     """
 
-    def __init__(
-        self, surface: RepairedSurface, avoided: list[Avoided], clearance: float
-    ) -> None:
+    def __init__(self, surface: RepairedSurface, avoided: list[Avoided], clearance: float) -> None:
         self.surface, self.avoided, self.clearance = surface, avoided, clearance
         self._off_curves = cache(lambda mapped: surface_off_curves(mapped, avoided, clearance))
         self._on_component = cache(_on_component)

@@ -89,18 +89,11 @@ def same_maps(one: Request, other: Request) -> bool:
     return _same(one.obstacles, other.obstacles) and _same(one.alignment, other.alignment)
 
 
-def same_curves(
-    one: tuple[SurfaceCurve, ...] | None, other: tuple[SurfaceCurve, ...] | None
-) -> bool:
-    """Whether two lists of curves are equal."""
-    return _same(one, other)
-
-
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
         return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)
     if isinstance(one, SurfaceCurve) and isinstance(other, SurfaceCurve):
-        return all(_same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
+        return all(_same(vars(one)[name], vars(other)[name]) for name in vars(one))
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):

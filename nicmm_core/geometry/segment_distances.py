@@ -12,6 +12,7 @@ surface within the limit, not the size of the mesh.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .grouping import grouped, occurrences
+from .grouping import occurrences
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
@@ -44,6 +45,24 @@ class FaceSegments:
 
     def __len__(self) -> int:
         return len(self.faces)
+
+    def taken(self, which: BoolArray) -> FaceSegments:
+        """Some of the segments."""
+        return FaceSegments(self.faces[which], self.start[which], self.end[which])
+
+    def positions(self, mesh: Mesh) -> tuple[FloatArray, FloatArray]:
+        """Positions of both ends, (s, 3)."""
+        start, end = (SurfacePoints(self.faces, ends) for ends in (self.start, self.end))
+        return start.positions(mesh), end.positions(mesh)
+
+
+def joined_segments(parts: Sequence[FaceSegments]) -> FaceSegments:
+    """Concatenate segments."""
+    return FaceSegments(
+        np.concatenate([np.zeros(0, np.int64), *(part.faces for part in parts)]),
+        np.concatenate([np.zeros((0, 3)), *(part.start for part in parts)]),
+        np.concatenate([np.zeros((0, 3)), *(part.end for part in parts)]),
+    )
 
 
 @dataclass(frozen=True)
@@ -127,8 +146,7 @@ class SegmentDistances:
         distance = (self.at_vertices[corners] + to_corner).min(axis=1)
 
         point, segment = occurrences(segments.faces, points.faces)
-        ends = [SurfacePoints(segments.faces, weights) for weights in (segments.start, segments.end)]
-        start, end = (each.positions(mesh)[segment] for each in ends)
+        start, end = (ends[segment] for ends in segments.positions(mesh))
         away = positions[point] - _nearest(positions[point], start, end)
         np.minimum.at(distance, point, np.linalg.norm(away, axis=1))
 
@@ -171,8 +189,7 @@ class SegmentDistances:
         """The sides of the faces of the segments, and the distances of the corners."""
         mesh, segments = self.mesh, self.segments
         corners = mesh.faces[segments.faces]
-        ends = [SurfacePoints(segments.faces, weights) for weights in (segments.start, segments.end)]
-        start, end = (each.positions(mesh) for each in ends)
+        start, end = segments.positions(mesh)
         for corner in corners.T:
             place = mesh.vertices[corner]
             away = np.linalg.norm(place - _nearest(place, start, end), axis=1)
@@ -202,7 +219,7 @@ class SegmentDistances:
     def _across(
         self, side: IntArray, start: FloatArray, end: FloatArray, before: FloatArray
     ) -> _Intervals:
-        """Whole sides of faces as intervals in the faces beyond, seen from segments in the faces."""
+        """Whole sides of faces as intervals in the faces beyond, seen from segments in them."""
         mesh = self.mesh
         triangles = _triangles(mesh, side)
         ends = np.stack([_placed(triangles, side, weights) for weights in (start, end)], axis=1)
@@ -214,9 +231,7 @@ class SegmentDistances:
         """The intervals on the other two sides of the faces that intervals lead into."""
         low = np.stack([intervals.low, np.zeros(len(intervals))], axis=1)
         high = np.stack([intervals.high, np.zeros(len(intervals))], axis=1)
-        left, right = (
-            (_nearest(at, intervals.start, intervals.end), at) for at in (low, high)
-        )
+        left, right = ((_nearest(at, intervals.start, intervals.end), at) for at in (low, high))
         face, own = np.divmod(intervals.side, 3)
         parts = []
         for first, last in ((1, 2), (2, 0)):
@@ -280,16 +295,13 @@ class SegmentDistances:
         mesh = self.mesh
         beyond = mesh.opposite_sides[side]
         inside = np.flatnonzero(beyond != side)
-        side, beyond, edge, third, source = (
-            values[inside] for values in (side, beyond, edge, third, source)
-        )
+        side, beyond = side[inside], beyond[inside]
+        edge, third, source = edge[inside], third[inside], source[inside]
         before, low, high = before[inside], low[inside], high[inside]
         # Two faces of a consistently oriented mesh traverse the edge in opposite directions.
         first = mesh.faces[side // 3, (side % 3 + 1) % 3]
         turned = first != mesh.faces[beyond // 3, (beyond % 3 + 1) % 3]
-        origin, other = (
-            np.where(turned[:, None], edge[:, 1 - k], edge[:, k]) for k in (0, 1)
-        )
+        origin, other = (np.where(turned[:, None], edge[:, 1 - k], edge[:, k]) for k in (0, 1))
         along = other - origin
         length = np.linalg.norm(along, axis=1)
         along /= length[:, None]

@@ -194,9 +194,7 @@ class FaceParts:
             Those of its end.
         """
         which, part, inverse = self._inverses(faces)
-        first, last = (
-            np.einsum("nd,ndc->nc", weights[which], inverse) for weights in (start, end)
-        )
+        first, last = (np.einsum("nd,ndc->nc", weights[which], inverse) for weights in (start, end))
         change = last - first
         with np.errstate(divide="ignore", invalid="ignore"):
             zero = -first / change

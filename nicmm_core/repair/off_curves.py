@@ -28,7 +28,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
 from ..geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
 from ..geometry.mesh import Mesh, edge_keys, edge_lengths, side_keys
-from ..geometry.segment_distances import FaceSegments, SegmentDistances
+from ..geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
 from ..geometry.surface_points import SurfacePoints
 from ..outputs.cut import CutMesh, cut_mesh
 from ..progress import checkpoint
@@ -72,6 +72,9 @@ RINGS = 3
 STRIP = 0.02
 """Width of a barrier on either side of the curve, as a fraction of the edges there."""
 
+DEVIATION = 1e-3
+"""Greatest distance of a barrier from the curve, in mean edge lengths."""
+
 STRIP_OF_CLEARANCE = 0.1
 """Greatest such width, in clearances."""
 
@@ -114,7 +117,7 @@ class Avoided:
         """Arc length at the beginning of each segment, and the total length."""
         return np.concatenate([[0.0], np.cumsum(np.linalg.norm(self.curve.steps, axis=1))])
 
-    def pieces(self, mesh: Mesh, breaks: FloatArray) -> tuple[FaceSegments, FloatArray, IntArray]:
+    def pieces(self, mesh: Mesh, breaks: FloatArray) -> tuple[FaceSegments, FloatArray]:
         """The segments of the curve, divided at some arc lengths.
 
         Returns
@@ -122,8 +125,6 @@ class Avoided:
         FaceSegments
         (s,) float array
             Arc length in the middle of each.
-        (s,) int array
-            Index of the point of the curve at which each begins; -1 for one that begins at a break.
         """
         arcs, curve = self.arcs, self.curve
         total, count = arcs[-1], len(arcs) - 1
@@ -139,14 +140,13 @@ class Avoided:
             weights_in_faces(mesh, curve.faces[ends], curve.barycentric[ends], faces)
             for ends in (segment, following)
         )
-        start, end = (
-            (((each - arcs[segment]) / length).clip(0.0, 1.0))[:, None] for each in (at[:-1], at[1:])
+        begin, stop = (
+            ((each - arcs[segment]) / length).clip(0.0, 1.0)[:, None] for each in (at[:-1], at[1:])
         )
         found = FaceSegments(
-            faces, (1.0 - start) * low + start * high, (1.0 - end) * low + end * high
+            faces, (1.0 - begin) * low + begin * high, (1.0 - stop) * low + stop * high
         )
-        begins = np.where(at[:-1] == arcs[segment], segment, -1)
-        return found, 0.5 * (at[:-1] + at[1:]), begins
+        return found, 0.5 * (at[:-1] + at[1:])
 
     def from_junctions(self, arc: FloatArray) -> FloatArray:
         """Distance along the curve from arc lengths, (s,), to the nearest junction."""
@@ -220,9 +220,7 @@ def surface_off_curves(
         parts, vertices = _without_strips(mesh, barriers, clearance)
     if clearance > 0.0:
         near = [_with_clearance(mapped, each, clearance) for each in avoided]
-        segments = FaceSegments(
-            *(np.concatenate(arrays) for arrays in zip(*(vars(s).values() for s in near), strict=True))
-        )
+        segments = joined_segments(near)
         if len(segments):
             distances = SegmentDistances(mesh, segments, REACH * clearance)
             parts, vertices = _beyond(distances, parts, vertices, clearance)
@@ -289,9 +287,7 @@ def check_off_curves(
             )
 
 
-def check_not_crossed(
-    mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]
-) -> None:
+def check_not_crossed(mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]) -> None:
     """Raise UnreachableError if a curve meets avoided curves elsewhere than at junctions."""
     points = curve.points[curve.control_index[curve.control_index >= 0]]
     for number, each in enumerate(avoided):
@@ -307,15 +303,13 @@ def check_not_crossed(
 def _with_clearance(mapped: MappedMesh, avoided: Avoided, clearance: float) -> FaceSegments:
     """The segments of a curve on the mesh from which the clearance is kept."""
     fade = FADE * clearance
-    segments, arc, _ = avoided.pieces(mapped.original, avoided.ends(fade))
+    segments, arc = avoided.pieces(mapped.original, avoided.ends(fade))
     counts = avoided.from_junctions(arc) >= fade
-    return _on_mesh(
-        mapped, FaceSegments(segments.faces[counts], segments.start[counts], segments.end[counts])
-    )
+    return _on_mesh(mapped, segments.taken(counts))
 
 
 def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
-    """Segments in faces of the given mesh as segments of the mesh, in every face that holds them."""
+    """Segments in faces of the given mesh as segments in all faces of the mesh that hold them."""
     if not mapped.differs:
         return segments
     given = mapped.original
@@ -395,7 +389,8 @@ def _beyond(
         count = len(before.faces)
         accurate &= (parts.faces[:count] == before.faces).all(axis=1)
         accurate = np.append(accurate, np.zeros(len(parts.faces) - count, dtype=bool))
-        values = _evaluated(distances, parts, np.append(values, np.full(len(vertices) - len(values), np.nan)))
+        unknown = np.full(len(vertices) - len(values), np.nan)
+        values = _evaluated(distances, parts, np.append(values, unknown))
         fixed = np.append(fixed, np.zeros(len(vertices) - len(fixed), dtype=bool))
     parts, vertices = _kept(parts, vertices, values - level, SNAP * clearance)
     return others.joined(parts), vertices
@@ -463,7 +458,7 @@ def _divided(
     places = (1.0 - share)[:, None] * vertices[ends[:, 0]] + share[:, None] * vertices[ends[:, 1]]
     vertices = np.concatenate([vertices, places])
     size = len(vertices)
-    keys = edge_keys(*ends.T, size)
+    keys = edge_keys(ends[:, 0], ends[:, 1], size)
     order = np.argsort(keys)
     keys, ends, middle, share = keys[order], ends[order], middle[order], share[order]
     lengths = edge_lengths(vertices, ends)
@@ -477,7 +472,7 @@ def _divided(
             break
         long = np.where(found[which], lengths[at[which]], -1.0)
         edge = at[which, long.argmax(axis=1)]
-        parts = parts.divided(which, *ends[edge].T, middle[edge], share[edge])
+        parts = parts.divided(which, ends[edge, 0], ends[edge, 1], middle[edge], share[edge])
     return parts, vertices
 
 
@@ -508,38 +503,30 @@ def _edges(faces: IntArray, size: int) -> IntArray:
 
 
 def _barriers(mapped: MappedMesh, avoided: Avoided, clearance: float) -> list[SurfaceCurve]:
-    """The parts of a curve on the mesh along which a strip is removed, without their gaps."""
-    given = mapped.original
-    if clearance > 0.0 and not len(avoided.junctions):
+    """The parts of a curve on the mesh along which a strip is removed, without their gaps.
+
+    With a clearance, these are the parts near junctions from which it is not kept.
+    """
+    given, junctions = mapped.original, avoided.junctions
+    if clearance > 0.0 and not len(junctions):
         return []
-    gap = np.array([_gap(given, avoided, arc, clearance) for arc in avoided.junctions])
+    gap = np.array([_gap(given, avoided, arc, clearance) for arc in junctions])
     breaks = avoided.ends(gap)
     if clearance > 0.0:
         breaks = np.append(breaks, avoided.ends(FADE * clearance))
-    segments, arc, begins = avoided.pieces(given, breaks)
+    segments, arc = avoided.pieces(given, breaks)
     used = np.ones(len(arc), dtype=bool)
-    for junction, width in zip(avoided.junctions, gap, strict=True):
+    for junction, width in zip(junctions, gap, strict=True):
         used &= replace(avoided, junctions=np.array([junction])).from_junctions(arc) >= width
     if clearance > 0.0:
         used &= avoided.from_junctions(arc) <= FADE * clearance
-    closed = avoided.curve.closed
-    if used.all():
-        runs, closed_run = [np.arange(len(arc))], closed
-    else:
-        first = int((~used).argmax()) if closed else 0
-        order = np.roll(np.arange(len(arc)), -first)
-        runs = [run for run in np.split(order, np.flatnonzero(~used[order])) if len(run)]
-        runs = [run[used[run]] for run in runs]
-        closed_run = False
     found = []
-    for run in runs:
-        if not len(run):
-            continue
+    for run, closed in _runs(used, avoided.curve.closed):
         faces, weights = segments.faces[run], segments.start[run]
-        if not closed_run:
+        if not closed:
             faces = np.append(faces, faces[-1])
             weights = np.concatenate([weights, segments.end[run[-1:]]])
-        piece = curve_on_mesh(given, closed_run, faces, weights, np.zeros(0, np.int64))
+        piece = curve_on_mesh(given, closed, faces, weights, np.zeros(0, np.int64))
         there = mapped.curve_to(piece) if mapped.differs else piece
         if there is None:
             raise CurveError(
@@ -550,9 +537,23 @@ def _barriers(mapped: MappedMesh, avoided: Avoided, clearance: float) -> list[Su
     return found
 
 
+def _runs(used: BoolArray, closed: bool) -> list[tuple[IntArray, bool]]:
+    """Runs of consecutive segments that are used, and whether each of them is a closed curve."""
+    segment = np.arange(len(used))
+    if used.all():
+        return [(segment, closed)]
+    if closed:
+        segment = np.roll(segment, -int((~used).argmax()))
+    runs = np.split(segment, np.flatnonzero(~used[segment]))
+    runs = [run[used[run]] for run in runs]
+    return [(run, False) for run in runs if len(run)]
+
+
 def _gap(mesh: Mesh, avoided: Avoided, arc: float, clearance: float) -> float:
     """Half the width of the gap at a junction."""
-    segment = int((np.searchsorted(avoided.arcs, arc, side="right") - 1).clip(0, len(avoided.arcs) - 2))
+    segment = int(
+        (np.searchsorted(avoided.arcs, arc, side="right") - 1).clip(0, len(avoided.arcs) - 2)
+    )
     corners = mesh.faces[avoided.segment_faces[segment]]
     width = GAP * float(_side_lengths(mesh.vertices, mesh.faces[mesh.faces_at(corners)]).max())
     return min(width, GAP_OF_CLEARANCE * clearance) if clearance > 0.0 else width
@@ -566,8 +567,10 @@ def _without_strips(
     for barrier in barriers:
         checkpoint()
         points, _ = parts.through(mesh, barrier)
-        mapped = curve_on_mesh(cut, barrier.closed, points.faces, points.barycentric, barrier.control_index)
-        result = cut_mesh(cut, mapped)
+        mapped = curve_on_mesh(
+            cut, barrier.closed, points.faces, points.barycentric, barrier.control_index
+        )
+        result = cut_mesh(cut, mapped, deviation=DEVIATION * mesh.mean_edge_length)
         chain = np.concatenate([_with_new_points(cut, result, chain), result.chain_edges])
         corners = result.corner_weights(cut) @ parts.corners[result.source_face]
         parts = FaceParts(result.faces, parts.parent[result.source_face], corners)
@@ -579,7 +582,9 @@ def _without_strips(
     near = on_chain[parts.faces].sum(axis=1) >= 2
     sides = _edges(parts.faces[near], size)
     both = sides[on_chain[sides].all(axis=1)]
-    both = both[~np.isin(edge_keys(*both.T, size), edge_keys(*chain.T, size))]
+    both = both[
+        ~np.isin(edge_keys(both[:, 0], both[:, 1], size), edge_keys(chain[:, 0], chain[:, 1], size))
+    ]
     middle = size + np.arange(len(both))
     parts, vertices = _divided(parts, vertices, both, middle, np.full(len(both), 0.5))
     on_chain = np.append(on_chain, np.zeros(len(both), dtype=bool))
@@ -604,7 +609,9 @@ def _with_new_points(mesh: Mesh, cut: CutMesh, chain: IntArray) -> IntArray:
     along: dict[tuple[int, int], list[tuple[float, int]]] = defaultdict(list)
     for number in on_edge.tolist():
         (a, s), (b, t) = sorted(
-            (int(v), float(w)) for v, w in zip(corners[number], weights[number], strict=True) if w > 0.0
+            (int(v), float(w))
+            for v, w in zip(corners[number], weights[number], strict=True)
+            if w > 0.0
         )
         along[a, b].append((t / (s + t), len(mesh.vertices) + number))
     edges: list[tuple[int, int]] = []

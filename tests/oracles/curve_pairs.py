@@ -17,7 +17,7 @@ from nicmm_core.repair.face_parts import FaceParts
 from . import checker
 
 AT_JUNCTION = 1e-9
-"""Distance of a point from a junction, in bounding-box diagonals, up to which it is the junction."""
+"""Distance up to which a point is a junction, in bounding-box diagonals."""
 
 
 def contacts(
@@ -89,9 +89,7 @@ def least_distance(
     if among is not None:
         measured = measured[among[segment[second.chain_point]]]
     none = np.zeros(0, dtype=np.int64)
-    distance = igl.exact_geodesic(
-        second.vertices, second.faces, first.chain, none, measured, none
-    )
+    distance = igl.exact_geodesic(second.vertices, second.faces, first.chain, none, measured, none)
     return float(np.min(distance))
 
 
