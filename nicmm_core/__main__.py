@@ -12,7 +12,7 @@ from . import Status, design_curve, options
 from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
-from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
+from .io.files import check_curve_path, read_curve, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
 from .path.via_points import parse_via_points
@@ -125,6 +125,13 @@ def _flag(option: Option) -> dict[str, Any]:
             "help": "vertices near which the curve runs after the I-th of the points, from 0; "
             "repeatable",
         }
+    if option.kind is Kind.CURVES:
+        return {
+            "action": "append",
+            "default": [],
+            "metavar": "CURVE.json",
+            "help": f"{words}; written with -o CURVE.json; repeatable",
+        }
     number = int if option.kind is Kind.COUNT else float
     return {"type": number, "default": option.default, "help": words}
 
@@ -134,6 +141,8 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
     value = getattr(given, option.name)
     if option.kind is Kind.POINTS:
         return parse_via_points(value) or None
+    if option.kind is Kind.CURVES:
+        return [read_curve(path) for path in value] or None
     if option.kind is Kind.WEIGHTS:
         return _automatic_map(mesh, value, given.angle)
     return value

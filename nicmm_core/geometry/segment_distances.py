@@ -160,11 +160,20 @@ class SegmentDistances:
         """Find all intervals, and the distances of the vertices."""
         mesh, distance = self.mesh, self.at_vertices
         intervals = self._from_segments()
-        changed = np.flatnonzero(distance <= self._scale)  # ends of segments at vertices
-        bent = self._bent_vertices()
+        # Lines also begin at ends of segments that are vertices.
+        bent = self._bent_vertices() | (distance <= self._scale)
+        begun = np.full(len(distance), np.inf)  # distances at which lines begin at vertices
         for _ in range(MOST_FACES):
             checkpoint()
-            intervals = self._useful(_joined([intervals, self._from_vertices(changed)]))
+            while True:
+                begins = bent & (distance < np.minimum(begun - self._scale, self.limit))
+                before = distance.copy()
+                self._lower_around(np.flatnonzero(begins))
+                if not (bent & (distance < before - self._scale)).any():
+                    break
+            begun[begins] = distance[begins]
+            intervals = _joined([intervals, self._from_vertices(np.flatnonzero(begins))])
+            intervals = self._useful(intervals)
             self._found.append(intervals)
             if not len(intervals):
                 break
@@ -172,10 +181,7 @@ class SegmentDistances:
             triangles = _triangles(mesh, intervals.side)
             apex = mesh.faces.ravel()[intervals.side]
             np.minimum.at(distance, apex, self._distance_if_seen(intervals, triangles[:, 2]))
-            changed = np.flatnonzero(distance < before - self._scale)
-            self._lower_around(changed)
-            changed = np.flatnonzero(distance < before - self._scale)
-            changed = changed[bent[changed] & (distance[changed] < self.limit)]
+            self._lower_around(np.flatnonzero(distance < before - self._scale))
             intervals = self._beyond(intervals, triangles)
         # Corners that no line reaches get a finite distance along edges.
         reached = np.unique(mesh.faces[np.unique(_joined(self._found).side // 3)])

@@ -269,9 +269,9 @@ def check_off_curves(
             name = PointName(argument, index)
             if not len(point):
                 raise ControlPointError(
-                    f"{name} is closer to a curve of avoid than the clearance ({clearance:g}), but "
-                    "does not lie on it; move it onto the curve or away from it, or use a smaller "
-                    "clearance",
+                    f"{name} is closer to a curve of avoid than the clearance ({clearance:g}), or "
+                    "right beside one, but does not lie on it; move it onto the curve or away from "
+                    "it, or use a smaller clearance",
                     name,
                 )
             component[name] = set(off.mesh.face_component[point.faces].tolist())
