@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import options
-from .design_result import Design
 from .errors import ArgumentError, CurveError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray
@@ -80,7 +79,7 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
 
 
 def _checked_curves(mesh: Mesh, name: str, value: Any) -> tuple[SurfaceCurve, ...] | None:
-    """Convert a list of curves, or of designs with one curve each, to curves on the mesh.
+    """Check that a list has only curves on the mesh.
 
     None and an empty list give None.
     """
@@ -92,13 +91,12 @@ def _checked_curves(mesh: Mesh, name: str, value: Any) -> tuple[SurfaceCurve, ..
         )
     found = []
     for number, given in enumerate(value):
-        curves = given.curves if isinstance(given, Design) else [given]
-        if len(curves) != 1 or not isinstance(curves[0], SurfaceCurve):
+        if not isinstance(given, SurfaceCurve):
             raise ArgumentError(
                 f"{name}[{number}] is {given!r}; pass a SurfaceCurve, or a Design with exactly "
                 "one curve"
             )
-        found.append(_checked_curve(mesh, f"{name}[{number}]", curves[0]))
+        found.append(_checked_curve(mesh, f"{name}[{number}]", given))
     return tuple(found) or None
 
 

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_iterations, checked_options
 from .blas_threads import single_blas_thread
-from .design_result import Design, cancelled_design
+from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
@@ -136,7 +136,7 @@ class Designer:
             "smoothness": smoothness,
             "obstacles": obstacles,
             "clearance": clearance,
-            "avoid": avoid,
+            "avoid": with_curves_of_designs(avoid),
             "alignment": alignment,
             "alternatives": alternatives,
         }

@@ -343,13 +343,14 @@ def test_five_curves_on_one_mesh(kind, seed):
     generator = np.random.default_rng(seed)
     clearance = [0.0, 0.01, 0.02, 0.03][seed] * mesh.diagonal
     designer, curves, attempts = nicmm.Designer(mesh), [], 0
+    free = np.ones(len(mesh.vertices), dtype=bool)  # a shared point would be a junction
     while len(curves) < 5:
         attempts += 1
         assert attempts < 60
         closed = bool(generator.random() < 0.2)
         first = generator.integers(len(mesh.vertices))
         away = np.linalg.norm(mesh.vertices - mesh.vertices[first], axis=1)
-        near = np.flatnonzero(away < 0.3 * mesh.diagonal)
+        near = np.flatnonzero(free & (away < 0.3 * mesh.diagonal))
         count = int(generator.integers(3 if closed else 2, 5))
         points = generator.choice(near, size=count, replace=False)
         given = {"avoid": curves, "clearance": clearance} if curves else {}
@@ -364,3 +365,4 @@ def test_five_curves_on_one_mesh(kind, seed):
             if clearance:
                 assert least_distance(mesh, curve, other, clearance / 6) >= LEAST * clearance
         curves.append(curve)
+        free[points] = False
