@@ -70,6 +70,7 @@ def line(plate):
     return nicmm.design_curve(plate, flat((-0.5, 0.0), (0.5, 0.0)), closed=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clearance", [0.07, 0.05, 0.02, 0.005])
 def test_a_parallel_line_keeps_the_clearance_and_no_more(plate, line, clearance):
     """Free, the curve would dip across the line between its two middle points."""
@@ -92,6 +93,7 @@ def test_without_clearance_it_only_does_not_cross(plate, line):
     assert 0.0 < distance_in_plane(design.curves[0], line.curves[0]) < 0.005
 
 
+@pytest.mark.slow
 def test_it_goes_round_the_end(plate, line):
     points = flat((0.45, 0.1), (0.45, -0.1))
     design = nicmm.design_curve(plate, points, closed=False, avoid=[line], clearance=CLEARANCE)
@@ -223,6 +225,7 @@ class TestArguments:
             nicmm.design_curve(plate, flat((0.0, 0.0), (0.9, 0.0)), closed=False, avoid=[fence])
         assert [point.index for point in error.value.points] == [1, 0]
 
+    @pytest.mark.slow
     def test_nothing_left(self, plate, line):
         with pytest.raises(nicmm.UnreachableError, match="avoid leaves no part of the surface"):
             nicmm.design_curve(plate, [3, 50, 90], avoid=[line], clearance=5.0)
@@ -248,6 +251,7 @@ def test_with_obstacles(plate, line):
     assert away.min() >= LEAST * CLEARANCE
 
 
+@pytest.mark.slow
 def test_dragging_keeps_the_side(plate, line):
     designer = nicmm.Designer(plate)
     points = flat((-0.4, 0.4), (0.0, 0.25), (0.4, 0.4))
