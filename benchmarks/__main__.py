@@ -46,6 +46,7 @@ MEASUREMENTS = (
     "search_effort",
     "courses",
     "course_pictures",
+    "prompts",
     "symmetry",
     "dabs",
     "resolution",

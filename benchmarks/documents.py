@@ -20,6 +20,7 @@ from . import (
     fuzz,
     guarantee,
     ninth_channel,
+    prompts,
     report,
     sharp_edges,
     transfer,
@@ -288,6 +289,10 @@ def _cuts(results: Results) -> str:
     )
 
 
+def _prompts(results: Results) -> str:
+    return _paragraph(prompts.cost(results))
+
+
 def _ninth_channel(results: Results) -> str:
     """The losses on sets with maps, and what the channel contributes."""
     runs, iterations = results["runs"], results["iterations"]
@@ -433,6 +438,7 @@ FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
     "degraded": (_degraded, "degraded"),
     "degraded_start": (_degraded_start, "degraded_start"),
     "obstacles": (_obstacles, "obstacles"),
+    "prompts": (_prompts, "prompts"),
     "cuts": (_cuts, "cuts"),
     "ninth_channel": (_ninth_channel, "ninth_channel"),
     "transfer": (_transfer, "transfer"),

@@ -76,6 +76,8 @@ class Picture:
         Whether to draw the edges of the mesh as thin dark lines.
     marks : (m, 3) float array or None
         Positions to show as small balls, such as via points.
+    frame : (n, 3) float array or None
+        Positions that the image is to contain; by default the curves and the marks.
     """
 
     title: str
@@ -86,6 +88,7 @@ class Picture:
     smooth: bool = True
     edges: bool = False
     marks: FloatArray | None = None
+    frame: FloatArray | None = None
 
 
 def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None = None) -> None:
@@ -108,9 +111,7 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     unit = picture.mesh.diagonal
     placed = picture.mesh.vertices @ axes.T / unit
     marks = np.zeros((0, 3)) if picture.marks is None else picture.marks
-    shown = np.concatenate([*(curve.points for curve, _ in picture.curves), marks]) @ axes.T / unit
-    centre = 0.5 * (shown.min(axis=0) + shown.max(axis=0))
-    width = max(MARGIN * float(np.ptp(shown, axis=0)[:2].max()), LEAST_WIDTH)
+    centre, width = framing(picture, axes)
     _add_mesh(picture, placed - centre, width)
     for number, (curve, colour) in enumerate(picture.curves):
         material = _material(f"Curve {number}", colour)
@@ -124,6 +125,16 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     _add_lights()
     _add_camera(width)
     _render(path, scale)
+
+
+def framing(picture: Picture, axes: FloatArray) -> tuple[FloatArray, float]:
+    """Centre of an image in the axes of the camera, and its width, both in mesh diagonals."""
+    marks = [] if picture.marks is None else [picture.marks]
+    places = [*(curve.points for curve, _ in picture.curves), *marks]
+    frame = np.concatenate(places) if picture.frame is None else picture.frame
+    shown = frame @ axes.T / picture.mesh.diagonal
+    centre = 0.5 * (shown.min(axis=0) + shown.max(axis=0))
+    return centre, max(MARGIN * float(np.ptp(shown, axis=0)[:2].max()), LEAST_WIDTH)
 
 
 def best_view(picture: Picture) -> FloatArray:
@@ -217,6 +228,8 @@ def _painted(picture: Picture) -> FloatArray:
 
 
 def _control_positions(picture: Picture) -> FloatArray:
+    if not picture.curves:
+        return np.zeros((0, 3))
     curve = picture.curves[0][0]
     return curve.points[curve.control_index[curve.control_index >= 0]]
 
@@ -301,8 +314,10 @@ def _linked(name: str, data: Any, towards: Colour | None = None, distance: float
     if towards is not None:
         direction = Vector(towards).normalized()
         added.location = distance * direction
-        # Looking straight down, Blender has Y up, which is what the axes of the view assume.
-        added.rotation_euler = (-direction).to_track_quat("-Z", "Y").to_euler()
+        # Looking straight down, Blender has Y up, which is what the axes of the view assume. Minus
+        # a zero would turn it upside down.
+        ahead = Vector([0.0 - part for part in direction])
+        added.rotation_euler = ahead.to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(added)
     return added
 

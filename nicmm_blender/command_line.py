@@ -82,17 +82,18 @@ def activate(name: str | None) -> None:
 
 
 def _points(options: argparse.Namespace) -> dict[str, str]:
-    """The control points as arguments of the operator."""
+    """The control points, and which of them are corners, as arguments of the operator."""
     for name in ("group", "points"):
         if getattr(options, name) == "":
             raise InputError(
                 f"--{name} is empty. Leave it out for the vertices selected in the file"
             )
-    if options.group is not None:
-        return {"point_group": options.group}
-    if options.points is not None:
-        return {"points": options.points}
-    return {}
+    given = {
+        "point_group": options.group,
+        "points": options.points,
+        "corners": options.corners,
+    }
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -106,14 +107,21 @@ def parser() -> argparse.ArgumentParser:
     command_parser.add_argument(
         "--object", metavar="NAME", help="default: the active object of the file"
     )
-    points = command_parser.add_argument_group(
+    control_points = command_parser.add_argument_group(
         "control points", "By default, the vertices that are selected in the file."
-    ).add_mutually_exclusive_group()
+    )
+    points = control_points.add_mutually_exclusive_group()
     points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
     points.add_argument(
         "--points",
         metavar="A,B,C",
         help='vertex indices from 0, or positions in local space: "0.5 0 1, 0 0 2, 41"',
+    )
+    control_points.add_argument(
+        "--corners",
+        metavar="I,J",
+        help="control points at which the curve may turn freely, by their indices among the "
+        "points, from 0",
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = command_parser.add_argument_group("settings", "The same as in the sidebar.")

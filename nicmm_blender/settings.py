@@ -13,7 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..nicmm_core.options import OPTIONS, Kind, Option
+from ..nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
 from .scene import curve_record
 
@@ -26,6 +26,9 @@ AUTOMATIC = (
 """A choice of the option `order` that only the extension has, listed before those of the core."""
 
 
+NORMAL_BENDING = 0.3
+"""Default of the option `normal_bending` in Blender; see docs/normal_bending.md."""
+
 CURVE = StringProperty(
     name="Curve Object",
     description="Name of the designed curve. Leave empty for the active one",
@@ -34,13 +37,22 @@ CURVE = StringProperty(
 """The property of operators that names a designed curve."""
 
 
+CORNERS = StringProperty(
+    name="Corners",
+    description="Control points at which the curve may turn freely, for scripts: their indices "
+    "among the points given, from 0, separated by commas, such as 0, 2",
+    options={"HIDDEN", "SKIP_SAVE"},
+)
+"""The property of operators that names corners."""
+
+
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name, except for points and curves."""
+    """Blender properties for core options, without those of compound kinds."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
-        if option.kind not in (Kind.POINTS, Kind.CURVES)
+        if option.kind not in COMPOUND_KINDS
     }
 
 
@@ -72,7 +84,8 @@ def _property(option: Option) -> "bpy.props._PropertyDeferred":
         whole = {name: int(value) for name, value in limits.items()}
         return IntProperty(**words, **whole, default=option.default)
     subtype = "DISTANCE" if option.kind is Kind.LENGTH else "NONE"
-    return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
+    default = NORMAL_BENDING if option.name == "normal_bending" else option.default
+    return FloatProperty(**words, **limits, subtype=subtype, default=default)
 
 
 SURFACE = {
@@ -328,9 +341,10 @@ def draw_design(
     layout.use_property_decorate = False
     for name in ("closed", "order", "method", "smoothness"):
         layout.prop(properties, name)
-    row = layout.row()
-    row.active = properties.method == "ELASTIC"
-    row.prop(properties, "alternatives")
+    column = layout.column()
+    column.active = properties.method == "ELASTIC"
+    column.prop(properties, "normal_bending")
+    column.prop(properties, "alternatives")
     layout.prop(properties, "use_modifiers")
 
 

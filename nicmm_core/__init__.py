@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .design import Designer as Designer
     from .design import design_curve as design_curve
+    from .design import mirrored as mirrored
     from .design_result import Design as Design
     from .errors import ArgumentError as ArgumentError
     from .errors import ControlPointError as ControlPointError
@@ -40,6 +41,7 @@ _NAMES = {
     "design": (
         "Designer",
         "design_curve",
+        "mirrored",
     ),
     "design_result": ("Design",),
     "errors": (

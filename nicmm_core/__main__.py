@@ -12,6 +12,7 @@ from . import Status, design_curve, options
 from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
+from .geometry.mirror import parse_plane
 from .io.files import check_curve_path, read_curve, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
@@ -43,7 +44,9 @@ def _parser() -> argparse.ArgumentParser:
     design.add_argument("--points", required=True, metavar="A,B,C", help="vertex indices, from 0")
     design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
     for option in options.OPTIONS:
-        design.add_argument(f"--{option.flag or option.name}", dest=option.name, **_flag(option))
+        name = option.flag or option.name
+        flags = dict.fromkeys((f"--{name.replace('_', '-')}", f"--{name}"))
+        design.add_argument(*flags, dest=option.name, **_flag(option))
     design.add_argument(
         "--angle",
         type=float,
@@ -74,13 +77,7 @@ def _parser() -> argparse.ArgumentParser:
 def _design(given: argparse.Namespace) -> None:
     check_curve_path(given.output)
     mesh = read_mesh(given.mesh)
-    try:
-        points = [int(index) for index in given.points.split(",")]
-    except ValueError as error:
-        raise ArgumentError(
-            f"--points is {given.points!r}; give vertex indices separated by commas, such as "
-            "12,80,41"
-        ) from error
+    points = _indices("points", given.points, "vertex indices", "12,80,41")
     design = design_curve(
         mesh,
         points,
@@ -132,6 +129,14 @@ def _flag(option: Option) -> dict[str, Any]:
             "metavar": "CURVE.json",
             "help": f"{words}; written with -o CURVE.json; repeatable",
         }
+    if option.kind is Kind.INDICES:
+        return {"metavar": "I,J", "help": f"{words}, by their places in --points, from 0"}
+    if option.kind is Kind.PLANE:
+        return {
+            "metavar": "X|Y|Z|PLANE",
+            "help": f"{words}. An axis, for the plane through the origin at right angles to it, or "
+            "a point of the plane and its normal, such as 0,0,0,1,0,0",
+        }
     number = int if option.kind is Kind.COUNT else float
     return {"type": number, "default": option.default, "help": words}
 
@@ -143,9 +148,24 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
         return parse_via_points(value) or None
     if option.kind is Kind.CURVES:
         return [read_curve(path) for path in value] or None
+    if option.kind is Kind.INDICES:
+        what = "indices of control points"
+        return None if value is None else _indices(option.name, value, what, "0,2")
     if option.kind is Kind.WEIGHTS:
         return _automatic_map(mesh, value, given.angle)
+    if option.kind is Kind.PLANE:
+        return parse_plane(value)
     return value
+
+
+def _indices(flag: str, text: str, what: str, example: str) -> list[int]:
+    """Parse indices separated by commas."""
+    try:
+        return [int(index) for index in text.split(",")]
+    except ValueError as error:
+        raise ArgumentError(
+            f"--{flag} is {text!r}; give {what} separated by commas, such as {example}"
+        ) from error
 
 
 def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> FloatArray | None:

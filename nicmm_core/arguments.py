@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from . import options
 from .errors import ArgumentError, CurveError
 from .geometry import tolerances
-from .geometry.array_types import FloatArray
+from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve, checked_curve, points_of
 from .geometry.mesh import Mesh, real_array
+from .geometry.mirror import checked_plane
 from .options import Kind, Option
 
 
@@ -33,7 +34,8 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     -------
     dict
         The checked values by name, with weights as (V,) float arrays and curves as a tuple. Via
-        points are returned unchecked; `path.via_points` checks them.
+        points and indices are returned unchecked; `path.via_points` and `checked_corners` check
+        them.
 
     Raises
     ------
@@ -75,6 +77,8 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
         return _checked_count(option, value)
     if option.kind is Kind.CURVES:
         return _checked_curves(mesh, name, value)
+    if option.kind is Kind.PLANE:
+        return None if value is None else checked_plane(name, value, mesh)
     return value
 
 
@@ -162,6 +166,24 @@ def _checked_count(option: Option, value: Any) -> int:
 
 def _is_whole(value: Any) -> bool:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def checked_corners(corners: Any, count: int) -> IntArray:
+    """Check the indices of corners among `count` control points; each once and ascending."""
+    if corners is None:
+        return np.zeros(0, dtype=np.int64)
+    try:
+        given = list(corners)
+    except TypeError as error:
+        raise ArgumentError(
+            f"corners is {corners!r}; pass indices of control points, such as [0, 2]"
+        ) from error
+    for place, index in enumerate(given):
+        if not (_is_whole(index) and 0 <= index < count):
+            raise ArgumentError(
+                f"corners[{place}] is {index!r}; pass the index of a control point, 0 … {count - 1}"
+            )
+    return np.unique(np.array(given, dtype=np.int64))
 
 
 def check_iterations(max_iterations: Any) -> None:

@@ -24,26 +24,54 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_iterations, checked_options
+from .arguments import check_iterations, checked_corners, checked_options
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
-from .errors import ArgumentError, UnreachableError
+from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
+from .geometry.mirror import Plane, checked_plane
+from .geometry.surface_points import (
+    SurfacePoints,
+    check_connected,
+    check_count,
+    locate_control_points,
+    locate_points,
+    nearest_points,
+    snapped,
+)
+from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
 from .repair.off_curves import Avoided, avoided_curves, check_not_crossed
-from .repaired_surface import Manifold, RepairedSurface, SurfaceOffCurves, is_on, start_on
+from .repaired_surface import (
+    Manifold,
+    RepairedSurface,
+    SurfaceOffCurves,
+    curve_of_design,
+    is_on,
+    only_curve,
+    start_on,
+)
 from .request import Request, same_request
 from .status import Status
+from .symmetry.mirrored_design import mirrored_design
+from .symmetry.symmetric_request import (
+    FARTHEST_IMAGE,
+    ReflectedVertices,
+    reflected_vertices,
+    symmetric_weights,
+    with_images,
+    with_via_images,
+)
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that share only single vertices; a "
@@ -81,6 +109,7 @@ class Designer:
         self.mesh = mesh
         self._free: _Free | None = None  # of the last request with obstacles
         self._off_curves: SurfaceOffCurves | None = None  # of the last one with curves to avoid
+        self._reflected: ReflectedVertices | None = None  # of the last one with maps and a mirror
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
 
@@ -97,6 +126,9 @@ class Designer:
         clearance: float = 0.0,
         avoid: Sequence[SurfaceCurve | Design] | None = None,
         smoothness: float = 1.0,
+        corners: ArrayLike | None = None,
+        normal_bending: float = 0.0,
+        mirror: ArrayLike | None = None,
         alternatives: int = 0,
         start: Design | SurfaceCurve | None = None,
         max_iterations: int | None = None,
@@ -134,10 +166,13 @@ class Designer:
             "via_points": via_points,
             "method": method,
             "smoothness": smoothness,
+            "corners": corners,
+            "normal_bending": normal_bending,
             "obstacles": obstacles,
             "clearance": clearance,
             "avoid": with_curves_of_designs(avoid),
             "alignment": alignment,
+            "mirror": mirror,
             "alternatives": alternatives,
         }
         if progress is not None and not callable(progress):
@@ -146,24 +181,58 @@ class Designer:
             with watched(progress), single_blas_thread(), self._exclusive():
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
-                points = locate_control_points(self.mesh, control_points, closed, connected=False)
-                options["via_points"] = located_via_points(
-                    self.mesh, points, options["via_points"], order, closed
-                )
-                request = Request(points=points, **options)
+                request = self._request(control_points, options)
                 manifold, there = self._on_manifold(request)
                 if isinstance(start, Design) and _answers(start, manifold, there):
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(manifold, start)
                 with placed(manifold.in_original):
                     found = manifold.designer.design(there, started, begin, max_iterations)
-                    design = manifold.design_on_original(found, points)
+                    design = manifold.design_on_original(found, request)
                     if request.avoid is not None:
-                        avoided = avoided_curves(self.mesh, request.avoid, points)
+                        avoided = avoided_curves(self.mesh, request.avoid, request.points)
                         design = _check_not_crossed(self.mesh, design, avoided)
                     return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
+
+    def mirrored(self, design: Design, plane: ArrayLike) -> Design:
+        """The mirror image of a design; see the function `mirrored`."""
+        started = time.perf_counter()
+        if not isinstance(design, Design):
+            raise ArgumentError(f"design is a {type(design).__name__}; pass a Design")
+        checked = checked_plane("plane", plane, self.mesh)
+        curve, _ = curve_of_design(self.mesh, only_curve(design, "design"), "design")
+        positions = checked.reflected(curve.points)
+        with self._exclusive():
+            images, distance = nearest_points(self.mesh, positions)
+            if (distance > FARTHEST_IMAGE * self.mesh.diagonal).any():
+                raise CurveError(
+                    f"the mirror image of design is up to {distance.max():.3g} away from the "
+                    f"surface, more than {FARTHEST_IMAGE:.0%} of the mesh's diagonal; pass another "
+                    "plane"
+                )
+            unpainted = checked_options(
+                self.mesh, {option.name: option.default for option in OPTIONS}
+            )
+            unpainted |= {"closed": curve.closed, "via_points": {}}
+            unpainted["corners"] = checked_corners(None, len(curve.control_index))
+            if design.resumable is not None:
+                before = design.resumable
+                corners = before.request.are_corners(before.visited)
+                unpainted["corners"] = np.flatnonzero(corners)
+                unpainted["normal_bending"] = before.request.normal_bending
+            request = Request(points=snapped(images[curve.control_index]), **unpainted)
+            manifold, there = self._on_manifold(request)
+            found = mirrored_design(
+                manifold.designer.surface,
+                there,
+                manifold.from_original(positions),
+                curve,
+                design.status,
+            )
+            result = manifold.design_on_original(found, request)
+        return replace(result, seconds=time.perf_counter() - started)
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:
@@ -174,6 +243,46 @@ class Designer:
             yield
         finally:
             self._lock.release()
+
+    def _request(
+        self, control_points: ArrayLike | SurfacePoints, options: dict[str, Any]
+    ) -> Request:
+        """The request for checked options, with the mirror images if it has a mirror."""
+        mesh, plane, via = self.mesh, options["mirror"], options["via_points"]
+        order, closed = options["order"], options["closed"]
+        if plane is None:
+            points = locate_control_points(mesh, control_points, closed, connected=False)
+            options["via_points"] = located_via_points(mesh, points, via, order, closed)
+            options["corners"] = checked_corners(options["corners"], len(points))
+            return Request(points=points, **options)
+        if options["avoid"] is not None:
+            raise ArgumentError("avoid and mirror cannot be combined; leave one out")
+        given = locate_points(mesh, control_points, "control_points")
+        if not len(given):
+            check_count(0, closed)
+        among = self._whole.faces_connected_to(given)
+        points, mirror = with_images(mesh, given, plane, closed, order, among)
+        crosses = bool(mirror.side[len(given) - 1])  # the last leg of the half leads to the plane
+        located = located_via_points(mesh, given, via, order, crosses)
+        options["via_points"] = with_via_images(mesh, located, len(given), mirror, among)
+        options["mirror"] = mirror
+        corners = checked_corners(options["corners"], len(given))
+        options["corners"] = np.union1d(corners, mirror.image[corners])
+        for name in ("obstacles", "alignment"):
+            if options[name] is not None:
+                reflected = self._reflected_under(mirror.plane)
+                options[name] = symmetric_weights(mesh, options[name], reflected)
+        return Request(points=points, **options)
+
+    def _reflected_under(self, plane: Plane) -> ReflectedVertices:
+        """The mirror images of the vertices; they are kept until a request has another mirror."""
+        last = self._reflected
+        if last is None or not (
+            np.array_equal(last.plane.point, plane.point)
+            and np.array_equal(last.plane.normal, plane.normal)
+        ):
+            last = self._reflected = reflected_vertices(self.mesh, plane)
+        return last
 
     @cached_property
     def _whole(self) -> RepairedSurface:
@@ -283,6 +392,9 @@ def design_curve(
     clearance: float = 0.0,
     avoid: Sequence[SurfaceCurve | Design] | None = None,
     smoothness: float = 1.0,
+    corners: ArrayLike | None = None,
+    normal_bending: float = 0.0,
+    mirror: ArrayLike | None = None,
     alternatives: int = 0,
     progress: Progress | None = None,
 ) -> Design:
@@ -322,6 +434,24 @@ def design_curve(
         Only with the method "elastic".
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
+    corners : (c,) int array_like, optional
+        Indices of control points at which the curve may turn freely. No bending is counted there.
+        Only with the method "elastic".
+    normal_bending : float, default 0
+        Weight w of the normal curvature: the bending energy is ∮ (κ_g² + w κ_n²) ds in place of
+        ∮ κ_g² ds, so the curve avoids ridges and valleys. With 1, the whole curvature in space
+        counts. Only with the method "elastic".
+    mirror : (2, 3) array_like, optional
+        A point of a plane and its normal. The curve is then its own mirror image: it passes through
+        the control points, which lie on one side of the plane or on it, and then through their
+        mirror images in reverse order. It crosses the plane at right angles. A closed curve crosses
+        it twice, an open one once; the first and the last point of a closed curve, and the last
+        point of an open one, may lie on the plane. The images are the places of the mesh nearest to
+        the reflected points, and the `control_index` of the curve has them as well. A map counts on
+        both sides: each vertex has the greater of its own weight and that of its mirror image. The
+        mirror image of the leg from the i-th point has the images of ``via_points[i]``. With
+        "shortest", the order is that of a short path of the half. Not with `avoid`. Only for the
+        method "elastic".
     alternatives : int, default 0
         Largest number of further curves, along other courses, to return in `Design.alternatives`.
         Only with the method "elastic".
@@ -345,7 +475,7 @@ def design_curve(
     CurveError
         If a curve of `avoid` does not lie on the mesh.
     ArgumentError
-        If another argument cannot be used.
+        If another argument cannot be used, or the mesh is not symmetric enough about the mirror.
 
     Examples
     --------
@@ -367,6 +497,52 @@ def design_curve(
         clearance=clearance,
         avoid=avoid,
         smoothness=smoothness,
+        corners=corners,
+        normal_bending=normal_bending,
+        mirror=mirror,
         alternatives=alternatives,
         progress=progress,
     )
+
+
+def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
+    """The mirror image of a design, as a design on the same mesh.
+
+    Every point of the curve is moved to the place of the mesh nearest to its mirror image, and
+    consecutive places are joined by straight traces. The result is not relaxed; another design with
+    ``start=`` continues from it. `Designer.mirrored` does the same.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh of the design.
+    design : Design
+        A design with one curve.
+    plane : (2, 3) array_like
+        A point of the plane and its normal.
+
+    Returns
+    -------
+    Design
+        A design through the mirror images of the control points, in the same order, with the status
+        of the given one. Its energy has no term of maps.
+
+    Raises
+    ------
+    CurveError
+        If the design has not exactly one curve on this mesh, or its mirror image is too far from
+        the surface, or cannot be traced on it without crossing itself.
+    ArgumentError
+        If another argument cannot be used.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(3)
+    >>> left = nicmm.design_curve(mesh, [12, 80, 41], order="shortest")
+    >>> right = nicmm.mirrored(mesh, left, ((0, 0, 0), (1, 0, 0)))
+    >>> len(right.curves)
+    1
+    """
+    return Designer(mesh).mirrored(design, plane)

@@ -47,6 +47,9 @@ class Design:
     repairs : dict of str to int
         What was repaired on the copy of the mesh on which the curve was designed, and how often,
         such as ``{"faces turned": 12, "vertices joined": 40}``. Empty for a sound mesh.
+    asymmetry : float or None
+        With a mirror, the greatest distance of the curve to its mirror image, in mesh units; less
+        than a millionth of the diagonal if the surface is symmetric. None without a mirror.
     """
 
     status: Status
@@ -59,6 +62,7 @@ class Design:
     resumable: Resumable | None = dataclass_field(default=None, repr=False, compare=False)
     alternatives: list[Design] = dataclass_field(default_factory=list)
     repairs: dict[str, int] = dataclass_field(default_factory=dict)
+    asymmetry: float | None = None
 
     def __repr__(self) -> str:
         return (

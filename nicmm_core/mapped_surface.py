@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 from .geometry.mesh import Mesh
@@ -36,10 +37,16 @@ class MappedSurface:
         return surface_unit(self.mesh)
 
     def of(self, request: Request) -> CurveSurface:
-        """The surface with the maps of a request, which are those of the vertices of the mesh."""
-        if not request.has_maps:
-            return self.without_maps
-        if self._latest is None or not same_maps(self._latest[0], request):
-            maps = request.obstacles, request.alignment
-            self._latest = request, with_maps(self.without_maps, *maps, self.unit)
-        return self._latest[1]
+        """The surface with the maps and the weight of the normal curvature of a request.
+
+        The maps are those of the vertices of the mesh.
+        """
+        surface = self.without_maps
+        if request.has_maps:
+            if self._latest is None or not same_maps(self._latest[0], request):
+                maps = request.obstacles, request.alignment
+                self._latest = request, with_maps(surface, *maps, self.unit)
+            surface = self._latest[1]
+        if not request.normal_bending:
+            return surface
+        return replace(surface, normal_bending=request.normal_bending)

@@ -26,6 +26,12 @@ class Kind(Enum):
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
     CURVES = "a list of curves on the mesh, or None"
+    INDICES = "indices of control points, or None"
+    PLANE = "a point of a plane and its normal, or None"
+
+
+COMPOUND_KINDS = (Kind.POINTS, Kind.CURVES, Kind.INDICES, Kind.PLANE)
+"""Kinds of values that have several parts, and so no single field in a user interface."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +147,25 @@ OPTIONS: tuple[Option, ...] = (
         usual=(0.1, 10.0),
     ),
     Option(
+        "corners",
+        Kind.INDICES,
+        None,
+        "Corners",
+        "Control points at which the curve may turn freely",
+        elastic_only=True,
+    ),
+    Option(
+        "normal_bending",
+        Kind.NUMBER,
+        0.0,
+        "Normal Bending",
+        "Weight of the bending of the surface itself under the curve. 0 ignores it; larger values "
+        "give a curve that avoids ridges and valleys; 1 counts the whole curvature in space",
+        limits=(0.0, 10.0),
+        usual=(0.0, 1.0),
+        elastic_only=True,
+    ),
+    Option(
         "obstacles",
         Kind.WEIGHTS,
         None,
@@ -169,6 +194,14 @@ OPTIONS: tuple[Option, ...] = (
         None,
         "Alignment",
         "Weights that attract the curve",
+    ),
+    Option(
+        "mirror",
+        Kind.PLANE,
+        None,
+        "Mirror",
+        "Plane in which the curve is its own mirror image; the control points lie on one side",
+        elastic_only=True,
     ),
     Option(
         "alternatives",

@@ -36,6 +36,7 @@ from .repair.off_curves import Avoided, check_off_curves, surface_off_curves
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
+from .symmetry.reflection import asymmetry
 
 LARGEST_COPY = 200_000
 """Number of faces of a connected mesh above which curves are designed on the mesh itself.
@@ -73,6 +74,12 @@ class Manifold:
         """The mesh of the designer."""
         return self.designer.mesh
 
+    def from_original(self, positions: FloatArray) -> FloatArray:
+        """Map positions in the space of the given mesh, (n, 3), to that of the designer's mesh."""
+        for copy in self.copies:
+            positions = copy.from_original(positions)
+        return positions
+
     def in_original(self, positions: FloatArray) -> FloatArray:
         """Map positions on the mesh of the designer, (n, 3), to the given mesh."""
         for copy in self.copies[::-1]:
@@ -83,6 +90,10 @@ class Manifold:
         """Map a request from the given mesh to the mesh of the designer."""
         for copy in self.copies:
             request = mapped_request(request, copy.points_to, copy.weights_to)
+        if request.mirror is not None:
+            request = replace(
+                request, mirror=request.mirror.mapped(self.from_original, self.mesh.diagonal)
+            )
         return request
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
@@ -114,8 +125,8 @@ class Manifold:
             curve = mapped
         return curve
 
-    def design_on_original(self, design: Design, points: SurfacePoints) -> Design:
-        """Map a design to the given mesh, on which its control points are given.
+    def design_on_original(self, design: Design, request: Request) -> Design:
+        """Map a design to the given mesh, on which it is requested.
 
         It continues only on a mesh that equals the given one.
         """
@@ -124,11 +135,13 @@ class Manifold:
             curves = [copy.curve_back(curve) for curve in curves]
         if self.repaired.differs:
             removed = self.repaired.clean.removed_faces
-            curves = [removed.led_across(curve, points) for curve in curves]
+            curves = [removed.led_across(curve, request.points) for curve in curves]
+        mirror = request.mirror
         return replace(
             design,
             curves=curves,
-            alternatives=[self.design_on_original(other, points) for other in design.alternatives],
+            alternatives=[self.design_on_original(other, request) for other in design.alternatives],
+            asymmetry=None if mirror is None else asymmetry(curves[0], mirror.plane),
             find_field=partial(_field_back, self.copies, design),
             resumable=resumable and replace(resumable, given=self.repaired.original),
             repairs=dict(self.repaired.repairs),
@@ -171,6 +184,22 @@ class RepairedSurface:
             made = self._manifold(clean, connected)
             if made is not None:
                 yield made
+
+    def faces_connected_to(self, points: SurfacePoints) -> IntArray | None:
+        """Faces of the given mesh on the component that contains points.
+
+        None if these are all faces, or if there is no such component.
+        """
+        made = next(self.manifolds(), None)
+        component = None if made is None else made.common_component(points)
+        if made is None or component is None:
+            return None
+        label = made.mesh.face_component[made.in_mesh.parent]
+        return (
+            None
+            if (label == component).all()
+            else np.unique(made.in_given.parent[label == component])
+        )
 
     @property
     def most_connected(self) -> MappedMesh:
@@ -320,29 +349,9 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
     if isinstance(start, Design):
         if start.resumable is not None and is_on(manifold, start.resumable):
             return start.resumable
-        if len(start.curves) != 1:
-            raise CurveError(
-                f"start has {len(start.curves)} curves ({start.status.name}); pass a design with "
-                "exactly one curve"
-            )
-        start = start.curves[0]
+        start = only_curve(start, "start")
     original = manifold.repaired.original
-    curve, segment_faces = checked_curve(original, start, across_gaps=True)
-    index = curve.control_index
-    first = int(index.argmin()) if curve.closed and len(index) else 0
-    if len(index) < 2 or (index < 0).any() or (np.diff(np.roll(index, -first)) <= 0).any():
-        raise CurveError(
-            f"start has the control_index {index.tolist()}; pass a curve with at least two "
-            "control points that visits each of them once and in order"
-        )
-    points = SurfacePoints(curve.faces, curve.barycentric)
-    away = np.abs(points.positions(original) - curve.points).max(initial=0.0)
-    if not away <= tolerances.SAME_CURVE * original.diagonal:
-        raise CurveError(
-            f"start lies on another mesh: its points differ by up to {away:g} from the positions "
-            "that their faces and barycentric coordinates give on this mesh; pass the mesh that it "
-            "was designed on"
-        )
+    curve, segment_faces = curve_of_design(original, start, "start")
     if not curve.closed:
         segment_faces[-1] = curve.faces[-1]
     weights = weights_in_faces(original, curve.faces, curve.barycentric, segment_faces)
@@ -350,6 +359,42 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
     if not curve.closed:
         curve = _between_ends(original, curve)
     return manifold.curve(curve)
+
+
+def only_curve(design: Design, name: str) -> SurfaceCurve:
+    """The curve of a design; raises CurveError, with its name, unless it has exactly one."""
+    if len(design.curves) != 1:
+        raise CurveError(
+            f"{name} has {len(design.curves)} curves ({design.status.name}); pass a design with "
+            "exactly one curve"
+        )
+    return design.curves[0]
+
+
+def curve_of_design(
+    original: Mesh, given: SurfaceCurve, name: str
+) -> tuple[SurfaceCurve, IntArray]:
+    """Check that a curve lies on a mesh and visits its control points in order.
+
+    Returns what `checked_curve` returns. The name is that of the argument in messages.
+    """
+    curve, segment_faces = checked_curve(original, given, across_gaps=True)
+    index = curve.control_index
+    first = int(index.argmin()) if curve.closed and len(index) else 0
+    if len(index) < 2 or (index < 0).any() or (np.diff(np.roll(index, -first)) <= 0).any():
+        raise CurveError(
+            f"{name} has the control_index {index.tolist()}; pass a curve with at least two "
+            "control points that visits each of them once and in order"
+        )
+    points = SurfacePoints(curve.faces, curve.barycentric)
+    away = np.abs(points.positions(original) - curve.points).max(initial=0.0)
+    if not away <= tolerances.SAME_CURVE * original.diagonal:
+        raise CurveError(
+            f"{name} lies on another mesh: its points differ by up to {away:g} from the positions "
+            "that their faces and barycentric coordinates give on this mesh; pass the mesh that it "
+            "was designed on"
+        )
+    return curve, segment_faces
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:

@@ -172,7 +172,7 @@ def moved_start(
     if request.order == "given" and visited[0] != 0:
         curve, visited = _rotated_to_first(surface, curve, visited)
     _check_moves(surface.mesh, curve, visited, request.points)
-    points = request.points[visited]
+    points, curve = request.points[visited], curve.with_corners(request.are_corners(visited))
     moved = with_moved_controls(surface, curve, points)
     if moved is None:
         moved = _moved_in_steps(surface, curve, points, request.smoothness)

@@ -147,6 +147,7 @@ class StartSearch:
                 course.control_nodes,
                 request.points[course.visited],
                 request.closed,
+                corners=request.are_corners(course.visited),
             )
             yield None if curve is None else InitialCurve(curve, course.visited, mapped, unit)
 

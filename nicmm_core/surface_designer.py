@@ -12,18 +12,29 @@ from functools import partial
 import numpy as np
 
 from .design_result import Design
+from .errors import CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
+from .mapped_surface import MappedSurface
 from .progress import CancelledError, checkpoint, subrange
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
 from .request import Request
-from .start import Resumable, moved_start, unsettled_vertices
+from .start import WITHOUT_START, Resumable, moved_start, unsettled_vertices
 from .start_search import InitialCurve, StartSearch
 from .status import Status
+from .symmetry.half_order import in_shortest_order
+from .symmetry.half_search import NO_SYMMETRIC_CURVE, symmetric_by_halves
+from .symmetry.symmetric_relaxation import (
+    MOST_CANDIDATES,
+    SymmetricCurve,
+    best_symmetric,
+    relaxed_symmetric,
+    symmetric_from,
+)
 
 START_FRACTION = 0.6
 """Approximate fraction of the total time that passes before the relaxation."""
@@ -50,6 +61,11 @@ class SurfaceDesigner:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._search = StartSearch(mesh)
+
+    @property
+    def surface(self) -> MappedSurface:
+        """The surface of the mesh."""
+        return self._search.surface
 
     def design(
         self,
@@ -108,11 +124,34 @@ class SurfaceDesigner:
             collisions=collisions,
             unsettled=unsettled,
         )
-        relaxed = _relaxed(request, begin, config, max_iterations)
-        return self._relaxed_design(request, begin, relaxed, started)
+        if request.mirror is None:
+            relaxed = _relaxed(request, begin, config, max_iterations)
+            return self._relaxed_design(request, begin, relaxed, started)
+        if max_iterations is not None:
+            config = replace(config, most_iterations=max_iterations)
+        found = relaxed_symmetric(
+            request, begin, None, curve.length, partial(_relaxed_unless_cancelled, request), config
+        )
+        if found is None:
+            raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
+        return self._relaxed_design(request, *found, started)
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
+        if request.mirror is not None:
+            return self._designed_symmetric(request, max_iterations, started)
+        curves, cancelled = self._curves(request, max_iterations)
+        best, *others = [
+            self._relaxed_design(request, start, relaxed, started)
+            for start, relaxed in curves[: 1 + request.alternatives]
+        ]
+        status = Status.CANCELLED if cancelled else best.status
+        return replace(best, status=status, alternatives=others)
+
+    def _curves(
+        self, request: Request, max_iterations: int | None
+    ) -> tuple[list[tuple[InitialCurve, Relaxed]], bool]:
+        """Distinct curves by ascending energy with their starts, and whether it was cancelled."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
             courses = search.courses(request)
@@ -122,8 +161,9 @@ class SurfaceDesigner:
                 start = search.by_path(request)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
-            if max_iterations is not None or first.status is Status.CANCELLED:
-                return self._relaxed_design(request, start, first, started)
+            cancelled = first.status is Status.CANCELLED
+            if max_iterations is not None or cancelled:
+                return [(start, first)], cancelled
             improvement = Improvement(
                 search,
                 request,
@@ -132,17 +172,59 @@ class SurfaceDesigner:
                 [start],
                 [first],
             )
-            cancelled = False
             try:
                 improvement.improve(courses, by_course)
             except CancelledError:
                 cancelled = True
+        starts, relaxed = improvement.starts, improvement.relaxed
+        return [(starts[i], relaxed[i]) for i in improvement.by_energy()], cancelled
+
+    def _designed_symmetric(
+        self, request: Request, max_iterations: int | None, started: float
+    ) -> Design:
+        """Make the best curves symmetric and relax them."""
+        given, number = request, np.arange(len(request.points))
+        if request.order == "shortest":
+            given, number = in_shortest_order(self._search.surface.of(request), request)
+        try:
+            curves, cancelled = self._curves(given, max_iterations)
+        except UnreachableError:
+            curves, cancelled = [], False  # there may be a curve through the points of one side
+        if cancelled:
+            raise CancelledError  # before there was a symmetric curve
+        begins = self._symmetric_curves(given, curves)
+        if not begins:
+            raise UnreachableError(NO_SYMMETRIC_CURVE)
+        left = None
+        if max_iterations is not None:
+            left = max_iterations - sum(each.iterations for _, each in curves)
+        relax = partial(_relaxed_unless_cancelled, given)
+        found, cancelled = best_symmetric(given, begins, relax, left)
         best, *others = [
-            self._relaxed_design(request, improvement.starts[i], improvement.relaxed[i], started)
-            for i in improvement.by_energy()[: 1 + request.alternatives]
+            self._relaxed_design(
+                request, replace(start, visited=number[start.visited]), relaxed, started
+            )
+            for start, relaxed in found[: 1 + request.alternatives]
         ]
         status = Status.CANCELLED if cancelled else best.status
         return replace(best, status=status, alternatives=others)
+
+    def _symmetric_curves(
+        self, request: Request, curves: list[tuple[InitialCurve, Relaxed]]
+    ) -> list[SymmetricCurve]:
+        """Symmetric curves made of the best of some curves, or else of halves."""
+        found = [
+            symmetric
+            for start, each in curves[: MOST_CANDIDATES + request.alternatives]
+            for symmetric in symmetric_from(request, start, each.discrete_curve)
+        ]
+        if found:
+            return found
+        surface, unit = self._search.surface.of(request), self._search.surface.unit
+        return [
+            SymmetricCurve(curve, InitialCurve(nodes, visited, surface, unit))
+            for nodes, curve, visited in symmetric_by_halves(surface, request)
+        ]
 
     def _relaxed_design(
         self, request: Request, start: InitialCurve, relaxed: Relaxed, started: float
@@ -190,7 +272,15 @@ def _relaxed(
     movable = None
     if start.unsettled is not None:
         movable = movable_near(start.surface.mesh, start.unsettled, start.unit)
-    return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
+    return relax(
+        start.surface,
+        start.curve,
+        request.smoothness,
+        config,
+        watch,
+        movable,
+        request.are_corners(start.visited),
+    )
 
 
 def _relaxed_unless_cancelled(

@@ -149,6 +149,7 @@ class _Curve(ctypes.Structure):
         ("faces", POINTER),
         ("barycentric", POINTER),
         ("is_control", POINTER),
+        ("is_corner", POINTER),
         ("is_stuck", POINTER),
         ("positions", POINTER),
         ("node_index", POINTER),
@@ -166,8 +167,8 @@ class _CurveBuffers(ctypes.Structure):
 
 _PLACEMENT_ITEMS = Kernel("placement_items", COUNT, COUNT)
 _PLACE = Kernel(
-    "place_curve", SurfacePointers, PlacementRules, PointList, COUNT, COUNT, POINTER, COUNT,
-    POINTER, COUNT, _Curve,
+    "place_curve", SurfacePointers, PlacementRules, PointList, COUNT, COUNT, POINTER, POINTER,
+    COUNT, POINTER, COUNT, _Curve,
 )  # fmt: skip
 _LEVEL_ITEMS = Kernel("level_items", COUNT, COUNT, COUNT)
 _BEGIN = Kernel(
@@ -197,6 +198,8 @@ class CurveArrays(NamedTuple):
         Coordinates in them; positive except at control points.
     is_control : (n,) bool array
         Which nodes are control points; the first one is.
+    is_corner : (n,) bool array
+        At which of them the curve may turn freely.
     node_index : (n,) int array
         Index of each node in the polyline, ascending.
     polyline_faces : (p,) int array
@@ -209,6 +212,7 @@ class CurveArrays(NamedTuple):
     faces: IntArray
     barycentric: FloatArray
     is_control: BoolArray
+    is_corner: BoolArray
     node_index: IntArray
     polyline_faces: IntArray
     polyline_barycentric: FloatArray
@@ -219,14 +223,14 @@ class _Buffer:
 
     def __init__(self, room: int, points: int) -> None:
         self.faces, self.barycentric = np.empty(room, dtype=np.int64), np.empty((room, 3))
-        self.is_control, self.is_stuck = np.zeros((2, room), dtype=np.bool_)
+        self.is_control, self.is_corner, self.is_stuck = np.zeros((3, room), dtype=np.bool_)
         self.positions, self.node_index = np.empty((room, 3)), np.empty(room, dtype=np.int64)
         self.polyline = np.empty(points, dtype=np.int64), np.empty((points, 3))
         of_polyline = PointList(points, 0, *(array.ctypes.data for array in self.polyline))
         self.curve = _Curve(
             room, 0, 0, self.faces.ctypes.data, self.barycentric.ctypes.data,
-            self.is_control.ctypes.data, self.is_stuck.ctypes.data, self.positions.ctypes.data,
-            self.node_index.ctypes.data, of_polyline,
+            self.is_control.ctypes.data, self.is_corner.ctypes.data, self.is_stuck.ctypes.data,
+            self.positions.ctypes.data, self.node_index.ctypes.data, of_polyline,
         )  # fmt: skip
 
     def arrays(self) -> CurveArrays:
@@ -237,6 +241,7 @@ class _Buffer:
             self.faces[:n].copy(),
             self.barycentric[:n].copy(),
             self.is_control[:n].copy(),
+            self.is_corner[:n].copy(),
             self.node_index[:n].copy(),
             self.polyline[0][:p].copy(),
             self.polyline[1][:p].copy(),
@@ -247,9 +252,10 @@ class _Buffer:
         n, p = len(given.faces), len(given.polyline_faces)
         self.curve.n, self.curve.closed, self.curve.polyline.count = n, int(given.closed), p
         self.faces[:n], self.barycentric[:n] = given.faces, given.barycentric
-        self.is_control[:n], self.is_stuck[:n] = given.is_control, is_stuck
+        self.is_control[:n], self.is_corner[:n] = given.is_control, given.is_corner
+        self.is_stuck[:n] = is_stuck
         self.node_index[:n] = given.node_index
-        self.polyline[0][:p], self.polyline[1][:p] = given[5:]
+        self.polyline[0][:p], self.polyline[1][:p] = given[6:]
 
 
 def place_on_polyline(
@@ -258,6 +264,7 @@ def place_on_polyline(
     barycentric: FloatArray,
     closed: bool,
     controls: IntArray,
+    corners: BoolArray,
     count: int,
     rules: PlacementRules,
 ) -> CurveArrays:
@@ -274,6 +281,8 @@ def place_on_polyline(
         Whether the last point is joined to the first.
     controls : (k,) int array
         Indices of the control points in the polyline, ascending from 0.
+    corners : (k,) bool array
+        At which of them the curve may turn freely.
     count : int
     rules : PlacementRules
 
@@ -291,7 +300,7 @@ def place_on_polyline(
     scratch = np.empty(items)
     _PLACE(
         surface.pointers, rules, points, int(closed), k, address("controls", controls, INT, k),
-        count, scratch.ctypes.data, items, placed.curve,
+        address("corners", corners, BOOL, k), count, scratch.ctypes.data, items, placed.curve,
     )  # fmt: skip
     return placed.arrays()
 
@@ -316,6 +325,7 @@ class CurveRelaxation:
         address("faces", curve.faces, INT, n)
         address("barycentric", curve.barycentric, FLOAT, n, 3)
         address("is_control", curve.is_control, BOOL, n)
+        address("is_corner", curve.is_corner, BOOL, n)
         address("node_index", curve.node_index, INT, n)
         address("polyline_faces", curve.polyline_faces, INT, p)
         address("polyline_barycentric", curve.polyline_barycentric, FLOAT, p, 3)

@@ -38,6 +38,7 @@ class SurfacePointers(ctypes.Structure):
         ("folded", POINTER),
         ("feature_map", POINTER),
         ("feature_weight", NUMBER),
+        ("normal_bending", NUMBER),
     ]
 
 
@@ -55,6 +56,8 @@ class SurfaceArrays:
         φ_fea.
     feature_weight : float
         Factor of the map, in 1/length².
+    normal_bending : float
+        Weight of the normal curvature, squared, in the bending energy.
     """
 
     def __init__(
@@ -64,15 +67,19 @@ class SurfaceArrays:
         folded: BoolArray | None,
         feature_map: FloatArray | None,
         feature_weight: float,
+        normal_bending: float,
     ) -> None:
         self.mesh = mesh
-        self._given = (mesh, vertex_normals, folded, feature_map, feature_weight)
+        self._given = (
+            mesh, vertex_normals, folded, feature_map, feature_weight, normal_bending
+        )  # fmt: skip
         self.pointers = SurfacePointers(
             mesh.pointers,
             address("vertex_normals", vertex_normals, FLOAT, mesh.vertex_count, 3),
             optional_address("folded", folded, BOOL, mesh.face_count),
             optional_address("feature_map", feature_map, FLOAT, mesh.vertex_count),
             feature_weight,
+            normal_bending,
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -95,6 +102,7 @@ class NodePointers(ctypes.Structure):
         ("step_lengths", POINTER),
         ("conormals", POINTER),
         ("angles", POINTER),
+        ("is_corner", POINTER),
     ]
 
 
@@ -142,6 +150,8 @@ class NodeArrays:
         Whether the last node of each curve is joined to its first.
     curves : int
         Number c of curves, each with n / c consecutive nodes.
+    corners : (n,) bool array or None
+        Nodes at which the curve may turn freely.
 
     Attributes
     ----------
@@ -152,7 +162,8 @@ class NodeArrays:
     conormals : (n, 3) float array
         Unit vectors in the tangent planes, normal to the curve.
     angles : (n,) float array
-        Turning angles in the tangent planes, in radians; zero at the ends of open curves.
+        Turning angles in the tangent planes, in radians; zero at the ends of open curves and at
+        corners.
     """
 
     def __init__(
@@ -164,12 +175,13 @@ class NodeArrays:
         phi_fea: FloatArray,
         closed: bool,
         curves: int = 1,
+        corners: BoolArray | None = None,
     ) -> None:
         n = rows("faces", faces)
         if curves < 1 or n % curves:
             raise KernelError(f"curves is {curves}; pass a divisor of the number of nodes, {n}")
         self.count, self.closed, self.curves = n, closed, curves
-        self._given = (faces, barycentric, positions, normals, phi_fea, closed, curves)
+        self._given = (faces, barycentric, positions, normals, phi_fea, closed, curves, corners)
         self.steps, self.step_lengths = np.empty((n, 3)), np.empty(n)
         self.conormals, self.angles = np.empty((n, 3)), np.empty(n)
         self.pointers = NodePointers(
@@ -178,7 +190,7 @@ class NodeArrays:
             address("positions", positions, FLOAT, n, 3),
             address("normals", normals, FLOAT, n, 3), address("phi_fea", phi_fea, FLOAT, n),
             self.steps.ctypes.data, self.step_lengths.ctypes.data, self.conormals.ctypes.data,
-            self.angles.ctypes.data,
+            self.angles.ctypes.data, optional_address("corners", corners, BOOL, n),
         )  # fmt: skip
         _MEASURE_CURVES(self.pointers, curves)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import library, steps
 from .library import (
+    BOOL,
     COUNT,
     FLOAT,
     INT,
@@ -21,6 +22,7 @@ from .library import (
     Kernel,
     address,
     first_fixed,
+    optional_address,
     rows_of_curves,
 )
 from .nodes import SurfaceArrays, SurfacePointers
@@ -60,6 +62,7 @@ class _CurveBatch(ctypes.Structure):
         ("faces", POINTER),
         ("barycentric", POINTER),
         ("fixed", POINTER),
+        ("corners", POINTER),
         ("iterations", POINTER),
         ("quiet", POINTER),
         ("dampings", POINTER),
@@ -78,6 +81,7 @@ def relax_curves(
     faces: IntArray,
     barycentric: FloatArray,
     fixed: BoolArray,
+    corners: BoolArray | None,
     closed: bool,
     rules: RelaxationRules,
     batch: BatchRules,
@@ -94,6 +98,8 @@ def relax_curves(
         Coordinates in them.
     fixed : (c, n) bool array
         Nodes that do not move. The first one of each curve is one of them.
+    corners : (c, n) bool array or None
+        Those of them at which the curve may turn freely.
     closed : bool
         Whether the last node of each curve is joined to its first.
     rules : RelaxationRules
@@ -110,6 +116,7 @@ def relax_curves(
     address("faces", faces, INT, c, n)
     address("barycentric", barycentric, FLOAT, c, n, 3)
     first_fixed(fixed, c, n)
+    optional_address("corners", corners, BOOL, c, n)
     faces, barycentric = faces.copy(), barycentric.copy()
 
     def relax(part: slice, meanwhile: Callable[[], object]) -> None:
@@ -118,8 +125,8 @@ def relax_curves(
         dampings = np.full(count, rules.steps.least_damping)
         curves = _CurveBatch(
             count, n, int(closed), faces[part].ctypes.data, barycentric[part].ctypes.data,
-            fixed[part].ctypes.data, iterations.ctypes.data, quiet.ctypes.data,
-            dampings.ctypes.data,
+            fixed[part].ctypes.data, None if corners is None else corners[part].ctypes.data,
+            iterations.ctypes.data, quiet.ctypes.data, dampings.ctypes.data,
         )  # fmt: skip
         room, started = steps.PAIRS_OF_A_NODE * n, False
         while (iterations < batch.iterations).any():

@@ -153,6 +153,7 @@ class _Weights(ctypes.Structure):
         ("tension", NUMBER),
         ("contact", NUMBER),
         ("feature", NUMBER),
+        ("normal_bending", NUMBER),
         ("frozen_ds", POINTER),
     ]
 
@@ -244,7 +245,7 @@ class Linearised:
 
     Attributes
     ----------
-    tension, contact, feature : float
+    tension, contact, feature, normal_bending : float
         Weights of the terms.
     frozen_ds : (n,) float array or None
         ds at each node, held constant in the term of lanes; None without a map.
@@ -273,7 +274,8 @@ class Linearised:
 
         with_room_for_pairs(_LINEARISE, n, call)
         self.tension, self.contact = weights.tension, weights.contact
-        self.feature, self.energy = weights.feature, energy.value
+        self.feature, self.normal_bending = weights.feature, weights.normal_bending
+        self.energy = energy.value
         self.frozen_ds = frozen_ds if has_map else None
 
 

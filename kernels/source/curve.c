@@ -167,7 +167,8 @@ static int64_t steps_of_leg(const PlacementRules *rules, double length, double t
 /* Finds where the nodes lie; the number of nodes and which ones are control points are stored in
    the curve. */
 static int place_on_legs(const PlacementRules *rules, const Line *line, int64_t k,
-                         const int64_t *controls, int64_t count, Curve *placed)
+                         const int64_t *controls, const uint8_t *corners, int64_t count,
+                         Curve *placed)
 {
     int64_t legs = line->closed ? k : k - 1;
     for (int64_t leg = 0; leg < k; leg++) {
@@ -182,12 +183,15 @@ static int place_on_legs(const PlacementRules *rules, const Line *line, int64_t 
         int64_t steps = steps_of_leg(rules, line->arcs[end] - line->arcs[begin], total, count);
         if (placed->n + steps + 1 > placed->room) return ARRAY_TOO_SMALL;
         memset(placed->is_control + placed->n, 0, (size_t)steps);
+        memset(placed->is_corner + placed->n, 0, (size_t)steps);
         placed->is_control[placed->n] = 1;
+        placed->is_corner[placed->n] = corners[leg];
         place_on_leg(line, begin, end, steps, placed->n);
         placed->n += steps;
     }
     if (!line->closed) {
         placed->is_control[placed->n] = 1;
+        placed->is_corner[placed->n] = corners[k - 1];
         line->wanted[placed->n] = line->arcs[last];
         line->segment[placed->n] = last;
         placed->n++;
@@ -229,14 +233,14 @@ static int is_replaced(const PlacementRules *rules, const Line *line, int64_t k,
 }
 
 int place_on_polyline(const Surface *surface, const PlacementRules *rules, const PointList *points,
-                      int64_t closed, int64_t k, const int64_t *controls, int64_t count,
-                      Scratch scratch, Curve *placed)
+                      int64_t closed, int64_t k, const int64_t *controls, const uint8_t *corners,
+                      int64_t count, Scratch scratch, Curve *placed)
 {
     Line line;
     if (k < 1 || controls[0] != 0 || (k < 2 && !closed)) return INDEX_OUT_OF_RANGE;
     TRY(take_line(&scratch, placed->room, points, closed, &line));
     TRY(measure_line(surface, rules, &line));
-    TRY(place_on_legs(rules, &line, k, controls, count, placed));
+    TRY(place_on_legs(rules, &line, k, controls, corners, count, placed));
     placed->closed = closed;
     placed->polyline.count = 0;
     memset(placed->is_stuck, 0, (size_t)placed->n);
@@ -264,6 +268,7 @@ int copy_curve(const Curve *from, Curve *to)
     memcpy(to->faces, from->faces, n * sizeof *from->faces);
     memcpy(to->barycentric, from->barycentric, 3 * n * sizeof *from->barycentric);
     memcpy(to->is_control, from->is_control, n);
+    memcpy(to->is_corner, from->is_corner, n);
     memcpy(to->is_stuck, from->is_stuck, n);
     memcpy(to->node_index, from->node_index, n * sizeof *from->node_index);
     memcpy(to->polyline.faces, from->polyline.faces, count * sizeof *from->faces);
@@ -280,9 +285,10 @@ EXPORTED int64_t placement_items(int64_t n, int64_t points)
 /* Places nodes on a polyline; see `place_on_polyline`. */
 EXPORTED int place_curve(const Surface *surface, const PlacementRules *rules,
                          const PointList *points, int64_t closed, int64_t k,
-                         const int64_t *controls, int64_t count, double *scratch,
-                         int64_t scratch_items, Curve *placed)
+                         const int64_t *controls, const uint8_t *corners, int64_t count,
+                         double *scratch, int64_t scratch_items, Curve *placed)
 {
     const Scratch memory = {scratch, scratch_items};
-    return place_on_polyline(surface, rules, points, closed, k, controls, count, memory, placed);
+    return place_on_polyline(surface, rules, points, closed, k, controls, corners, count, memory,
+                             placed);
 }

@@ -14,6 +14,7 @@ typedef struct {
     int64_t *faces;      /* (room) faces of the nodes */
     double *barycentric; /* (room, 3) coordinates in them; positive except at control points */
     uint8_t *is_control; /* (room) whether each node is a control point; the first one is */
+    uint8_t *is_corner;  /* (room) control points at which the curve may turn freely */
     uint8_t *is_stuck;   /* (room) nodes that must not move, as they could not be retraced, or have
                             reached a boundary */
     double *positions;   /* (room, 3) of the nodes; only results have them */
@@ -40,10 +41,11 @@ int find_arcs_of_points(const Mesh *mesh, const PointList *points, int64_t close
 
    The polyline keeps its shape: nodes are inserted, and points inside faces are dropped only where
    a node is. `controls`, (k), are the indices of the control points in the polyline, ascending; the
-   first one is 0. `count` is the approximate number of nodes. */
+   first one is 0. `corners`, (k), tells at which of them the curve may turn freely. `count` is the
+   approximate number of nodes. */
 int place_on_polyline(const Surface *surface, const PlacementRules *rules, const PointList *points,
-                      int64_t closed, int64_t k, const int64_t *controls, int64_t count,
-                      Scratch scratch, Curve *placed);
+                      int64_t closed, int64_t k, const int64_t *controls, const uint8_t *corners,
+                      int64_t count, Scratch scratch, Curve *placed);
 
 int copy_curve(const Curve *from, Curve *to);
 

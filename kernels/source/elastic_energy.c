@@ -16,14 +16,15 @@ int take_system(Scratch *scratch, int64_t n, System *system)
 
 int64_t items_of_linearisation(int64_t n)
 {
-    return 9 * n;
+    return 12 * n;
 }
 
 int take_linearisation(Scratch *scratch, int64_t n, Linearisation *linearisation)
 {
     TRY(take(scratch, 2 * n, &linearisation->residuals));
     TRY(take(scratch, 6 * n, &linearisation->jacobian));
-    return take(scratch, n, &linearisation->drift);
+    TRY(take(scratch, n, &linearisation->drift));
+    return take(scratch, 3 * n, &linearisation->normal_turns);
 }
 
 /* Tension at a node, with the excess of phi_fea in an obstacle. */
@@ -31,6 +32,25 @@ static double tension_at(const Nodes *nodes, const Weights *weights, int64_t i)
 {
     double excess = nodes->phi_fea[i] * nodes->phi_fea[i] - 1.0;
     return weights->tension + weights->feature * greater(excess, 0.0);
+}
+
+/* Change of the normal along the step after a node, (3), and its product with the step. The normal
+   of the next node is turned to the same side. */
+static double normal_change(const Nodes *nodes, int64_t i, double change[3])
+{
+    const double *normal = nodes->normals + 3 * i;
+    const double *next = nodes->normals + 3 * node_after(nodes, i);
+    double side = side_of_next(nodes, i);
+    for (int axis = 0; axis < 3; axis++) change[axis] = side * next[axis] - normal[axis];
+    return dot(change, nodes->steps + 3 * i);
+}
+
+double normal_bending_of_step(const Nodes *nodes, int64_t i)
+{
+    double change[3], length = greater(nodes->step_lengths[i], TINY);
+    if (!has_step(nodes, i)) return 0.0;
+    double along = normal_change(nodes, i, change) / length;
+    return along * along / length;
 }
 
 double elastic_energy(const Nodes *nodes, const Weights *weights)
@@ -43,6 +63,8 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
             double phi = lesser(nodes->phi_fea[i], 1.0);
             at_node += weights->feature * (phi * phi - 1.0) * weights->frozen_ds[i];
         }
+        if (weights->normal_bending > 0.0)
+            at_node += weights->normal_bending * normal_bending_of_step(nodes, i);
         energy += at_node;
     }
     return energy;
@@ -52,7 +74,8 @@ Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *r
                 double *frozen_ds)
 {
     double turn = 2.0 * PI / length_of_curve(nodes), tension = turn * turn / rules->smoothness;
-    Weights weights = {rules->tautness * tension, 0.0, 0.0, NULL};
+    Weights weights = {.tension = rules->tautness * tension,
+                       .normal_bending = surface->normal_bending};
     if (rules->contact > 0.0)
         weights.contact = rules->contact * elastic_energy(nodes, &weights) / (double)nodes->n;
     if (surface->feature_map) {
@@ -121,9 +144,9 @@ static int linearise_node(const Surface *surface, const Nodes *nodes, const Weig
     const double *normal = nodes->normals + 3 * i, *here = nodes->conormals + 3 * i;
     const double *here_before = nodes->conormals + 3 * h, *here_after = nodes->conormals + 3 * j;
     double length_before = nodes->step_lengths[h], length_after = nodes->step_lengths[i];
-    double normal_turn[3], flat_before[3], flat_after[3], by_before[3], by_after[3], by_here[3];
+    double flat_before[3], flat_after[3], by_before[3], by_after[3], by_here[3];
     double along_before[3], along_after[3], along_here[3];
-    double *drift = linearisation->drift + i;
+    double *drift = linearisation->drift + i, *normal_turn = linearisation->normal_turns + 3 * i;
     TRY(conormal_derivative(surface, nodes, i, normal_turn, drift));
 
     Turn turn = turn_at(before, after, normal);
@@ -155,10 +178,10 @@ static int linearise_node(const Surface *surface, const Nodes *nodes, const Weig
     double root_by[3] = {-dot(along_before, here_before) / (4.0 * root),
                          dot(along_here, here) / (4.0 * root),
                          dot(along_after, here_after) / (4.0 * root)};
-    if (is_open_end(nodes, i)) { /* no step before the first node and after the last */
+    if (turns_freely(nodes, i))
         for (int k = 0; k < 3; k++) angle_by[k] = 0.0;
-        root_by[i == 0 ? 0 : 2] = 0.0;
-    }
+    if (!has_step(nodes, h)) root_by[0] = 0.0;
+    if (!has_step(nodes, i)) root_by[2] = 0.0;
     double bending = nodes->angles[i] / root, phi = nodes->phi_fea[i];
     double pulled = sqrt(greater(tension_at(nodes, weights, i), TINY));
     double rising = phi > 1.0 ? weights->feature * phi * *drift : 0.0;
@@ -171,6 +194,42 @@ static int linearise_node(const Surface *surface, const Nodes *nodes, const Weig
     linearisation->residuals[2 * i] = bending;
     linearisation->residuals[2 * i + 1] = pulled * root;
     return OK;
+}
+
+/* The residual sqrt(weight kappa_n^2 ds) of the step after a node, with its sign, and its
+   derivatives by the moves of both nodes; `turns`, (n, 3), are those of the normals. */
+static double linearise_step(const Nodes *nodes, double weight, const double *turns, int64_t i,
+                             double by[2])
+{
+    int64_t j = node_after(nodes, i);
+    const double *step = nodes->steps + 3 * i;
+    const double *here = nodes->conormals + 3 * i, *there = nodes->conormals + 3 * j;
+    double change[3], along = normal_change(nodes, i, change), side = side_of_next(nodes, i);
+    double length = greater(nodes->step_lengths[i], TINY);
+    double factor = sqrt(weight / length) / length;
+    double by_length = 1.5 * along / length / length;
+    by[0] = -dot(turns + 3 * i, step) - dot(change, here) + by_length * dot(step, here);
+    by[1] = side * dot(turns + 3 * j, step) + dot(change, there) - by_length * dot(step, there);
+    by[0] *= factor;
+    by[1] *= factor;
+    return factor * along;
+}
+
+/* Adds the bending by the normal curvature to a system. */
+static void add_normal_bending(const Nodes *nodes, double weight, const double *turns,
+                               const System *system)
+{
+    int64_t n = nodes->n;
+    for (int64_t i = 0; i < n; i++) {
+        if (!has_step(nodes, i)) continue;
+        int64_t j = node_after(nodes, i);
+        double by[2], residual = linearise_step(nodes, weight, turns, i, by);
+        system->bands[i] += by[0] * by[0];
+        system->bands[j] += by[1] * by[1];
+        system->bands[n + i] += by[0] * by[1];
+        system->slope[i] += by[0] * residual;
+        system->slope[j] += by[1] * residual;
+    }
 }
 
 static inline double dot2(const double *one, const double *other)
@@ -205,17 +264,18 @@ int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *w
     /* The products of the Jacobian lack a part of the second derivative of the length: the
        stiffness of a taut string. */
     for (int64_t i = 0; i < n; i++) {
-        if (!nodes->closed && i == n - 1) continue;
+        if (!has_step(nodes, i)) continue;
         int64_t j = node_after(nodes, i);
         double length = greater(nodes->step_lengths[i], shortest);
         double stiffness = tension_at(nodes, weights, i) / length;
         /* Without an orientation, moves of two neighbours to the same side may have opposite
            signs. */
-        int opposite = dot(nodes->normals + 3 * i, nodes->normals + 3 * j) < 0.0;
         system->bands[i] += stiffness;
         system->bands[j] += stiffness;
-        system->bands[n + i] -= opposite ? -stiffness : stiffness;
+        system->bands[n + i] -= side_of_next(nodes, i) * stiffness;
     }
+    if (weights->normal_bending > 0.0)
+        add_normal_bending(nodes, weights->normal_bending, linearisation->normal_turns, system);
     return OK;
 }
 

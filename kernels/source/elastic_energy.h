@@ -19,6 +19,7 @@ typedef struct {
     double tension;        /* in 1/length^2 */
     double contact;        /* in 1/length; 0 where strands may cross */
     double feature;        /* of the map, in 1/length^2; 0 without a map */
+    double normal_bending; /* of the normal curvature, squared; that of the geodesic one is 1 */
     const double *frozen_ds; /* (n) ds, held constant in the term of lanes; NULL without a map */
 } Weights;
 
@@ -33,6 +34,7 @@ typedef struct {
     double *residuals; /* (n, 2) sqrt(kappa^2 ds) with its sign, and sqrt(tension ds) */
     double *jacobian;  /* (n, 3, 2) derivatives by the moves of nodes i - 1, i and i + 1 */
     double *drift;     /* (n) derivatives of phi_fea at each node by its own move */
+    double *normal_turns; /* (n, 3) derivatives of the normal at each node by its own move */
 } Linearisation;
 
 int64_t items_of_system(int64_t n);
@@ -43,6 +45,9 @@ int take_linearisation(Scratch *scratch, int64_t n, Linearisation *linearisation
 /* Weights for the present nodes; `frozen_ds`, (n), becomes their ds if there is a map. */
 Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *rules,
                 double *frozen_ds);
+
+/* Integral of the normal curvature, squared, along the step after a node, in 1/length. */
+double normal_bending_of_step(const Nodes *nodes, int64_t i);
 
 /* Energy without contact. */
 double elastic_energy(const Nodes *nodes, const Weights *weights);

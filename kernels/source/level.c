@@ -56,7 +56,8 @@ typedef struct {
 /* Number of items of scratch for curves of n nodes and polylines of `points` points. */
 EXPORTED int64_t level_items(int64_t n, int64_t points, int64_t pair_room)
 {
-    int64_t one = items_of_placement(n, points) + n, other = items_of_crossings(points) + 2 * PAIRS;
+    int64_t one = items_of_placement(n, points) + n + n / 8 + 1;
+    int64_t other = items_of_crossings(points) + 2 * PAIRS;
     return items_of_workspace(n, pair_room) + 3 * (n / 8 + 1) + 2 * (points + 1) +
            (one > other ? one : other);
 }
@@ -139,6 +140,7 @@ static void finish_curve(const Curve *old, const Nodes *nodes, Curve *next)
     next->n = nodes->n;
     next->closed = old->closed;
     memcpy(next->is_control, old->is_control, n);
+    memcpy(next->is_corner, old->is_corner, n);
     memcpy(next->is_stuck, old->is_stuck, n);
     memcpy(next->faces, nodes->faces, n * sizeof *nodes->faces);
     memcpy(next->barycentric, nodes->barycentric, 3 * n * sizeof *nodes->barycentric);
@@ -239,12 +241,16 @@ static int respace(const Surface *surface, const LevelRules *level, const Curve 
 {
     Scratch for_crossings = scratch;
     int64_t *controls, k = 0;
-    uint8_t *bad;
+    uint8_t *corners, *bad;
     TRY(take_integers(&scratch, curve->n, &controls));
-    for (int64_t i = 0; i < curve->n; i++)
-        if (curve->is_control[i]) controls[k++] = curve->node_index[i];
+    TRY(take_bytes(&scratch, curve->n, &corners));
+    for (int64_t i = 0; i < curve->n; i++) {
+        if (!curve->is_control[i]) continue;
+        corners[k] = curve->is_corner[i];
+        controls[k++] = curve->node_index[i];
+    }
     TRY(place_on_polyline(surface, &level->placement, &curve->polyline, curve->closed, k, controls,
-                          level->count, scratch, next));
+                          corners, level->count, scratch, next));
     if (!level->is_traced) return OK;
     TRY(take_bytes(&for_crossings, next->n, &bad));
     memset(bad, 0, (size_t)next->n);
@@ -283,7 +289,8 @@ static int chord_at(const Surface *surface, const Curve *curve, const double *ar
 }
 
 /* Finds the moves of the present nodes, those of `fine`, onto a cubic spline through the nodes of
-   `coarse` on the same polyline. None moves if two coarse nodes coincide. */
+   `coarse` on the same polyline. The spline turns freely at corners. None moves if two coarse nodes
+   coincide. */
 static int find_smoothing(const Surface *surface, const Curve *coarse, const Curve *fine,
                           const Workspace *space)
 {
@@ -303,6 +310,9 @@ static int find_smoothing(const Surface *surface, const Curve *coarse, const Cur
                 TRY(chord_at(surface, coarse, coarse_arcs, at + part - 1, chords[part],
                              steps + part));
             is_even &= steps[1] > 0.0;
+            if (coarse->is_corner[at]) memcpy(chords[0], chords[1], sizeof chords[0]);
+            int64_t end = at + 1 < coarse->n ? at + 1 : 0;
+            if (coarse->is_corner[end]) memcpy(chords[2], chords[1], sizeof chords[2]);
         }
         double t = (along - coarse_arcs[coarse->node_index[at]]) / greater(steps[1], TINY);
         t = lesser(greater(t, 0.0), 1.0);
@@ -353,13 +363,15 @@ static int refine(const Surface *surface, const RelaxationRules *rules, const Le
     if (fine->n <= coarse->n) return OK;
     TRY(take_workspace(scratch, fine->n, fine->closed, pair_room, &space));
     TRY(take_bytes(&space.rest, fine->n, &stays));
+    set_corners(&space, fine->is_corner);
     TRY(load_nodes(surface, fine, &space));
     TRY(find_smoothing(surface, coarse, fine, &space));
-    double before = bending_energy(&space.now);
+    double before = bending_energy(&space.now, surface->normal_bending);
     TRY(move_nodes(surface, &rules->traces, &space, 1.0, &space.trial, &work));
     take_trial(&space);
     TRY(retrace(surface, rules, level, fine, &space, next, stays));
-    return bending_energy(&space.now) < before ? OK : copy_curve(fine, next);
+    double after = bending_energy(&space.now, surface->normal_bending);
+    return after < before ? OK : copy_curve(fine, next);
 }
 
 /* Prepares a curve for a level: respaces its nodes if there are too many or too few of them, or if
@@ -373,6 +385,7 @@ EXPORTED int begin_level(const Surface *surface, const RelaxationRules *rules,
     Workspace space;
     int64_t away = curve->n - level->count, controls = controls_of(curve);
     TRY(take_workspace(memory, curve->n, curve->closed, pair_room, &space));
+    set_corners(&space, curve->is_corner);
     TRY(load_nodes(surface, curve, &space));
     if (away > controls || -away > controls)
         TRY(refine(surface, rules, level, buffers, pair_room, memory));
@@ -385,7 +398,7 @@ EXPORTED int begin_level(const Surface *surface, const RelaxationRules *rules,
 
 /* Decides what follows after an iteration, or if no step lowers the energy. */
 static void judge(const RelaxationRules *rules, const LevelRules *level, const Nodes *nodes,
-                  const Steps *found, Curve *next, LevelState *state)
+                  const Steps *found, const Weights *weights, Curve *next, LevelState *state)
 {
     if (state->has_moved) {
         state->stalled = found->after < state->least_energy ? 0 : state->stalled + 1;
@@ -394,7 +407,7 @@ static void judge(const RelaxationRules *rules, const LevelRules *level, const N
             state->outcome = STALLED;
             return;
         }
-        double least = level->least_decrease * scale_of_decrease(nodes, found);
+        double least = level->least_decrease * scale_of_decrease(nodes, found, weights);
         if (found->before - found->after > least) return;
     }
     if (state->releases == RELEASES || !any_of(next->is_stuck, next->n)) {
@@ -454,7 +467,7 @@ static int end_iteration(const Surface *surface, const RelaxationRules *rules,
         for (int64_t i = 0; i < next->n; i++)
             next->is_stuck[i] |= space->fixed[i] && !next->is_control[i] && may_move(movable, i);
     }
-    judge(rules, level, &space->now, found, next, state);
+    judge(rules, level, &space->now, found, weights, next, state);
     if (state->outcome != GOES_ON || !state->has_moved || found->farthest <= SMALL_MOVE ||
         unevenness(next, &space->now) <= level->spacing_ratio)
         return OK;
@@ -494,6 +507,7 @@ EXPORTED int relax_on_level(const Surface *surface, const RelaxationRules *given
     if (!(left > 0.0) || changed.iterations >= changed.most_iterations) rules.steps.steps = 0;
     if (left < (double)most_faces) most_faces = left > 1.0 ? (int64_t)left : 1;
     TRY(take_workspace(memory, n, curve->closed, pair_room, &space));
+    set_corners(&space, curve->is_corner);
     TRY(load_nodes(surface, curve, &space));
     for (int64_t i = 0; i < n; i++)
         space.fixed[i] = curve->is_control[i] || curve->is_stuck[i] || !may_move(movable, i);
@@ -525,6 +539,7 @@ EXPORTED int trace_level(const Surface *surface, const RelaxationRules *rules,
     Workspace space;
     int lost = 0;
     TRY(take_workspace(memory, curve->n, curve->closed, pair_room, &space));
+    set_corners(&space, curve->is_corner);
     TRY(load_nodes(surface, curve, &space));
     TRY(trace_deferred(surface, rules, level, curve, &space, &buffers->next, &lost));
     *is_lost = lost;

@@ -39,6 +39,11 @@ int take_workspace(Scratch scratch, int64_t n, int64_t closed, int64_t pair_room
     return OK;
 }
 
+void set_corners(Workspace *space, const uint8_t *is_corner)
+{
+    space->now.is_corner = space->trial.is_corner = space->farther.is_corner = is_corner;
+}
+
 void take_trial(Workspace *space)
 {
     Nodes before = space->now;
@@ -85,17 +90,20 @@ int energy_with_contact(const RelaxationRules *rules, const Nodes *nodes, const 
     return OK;
 }
 
-double bending_energy(const Nodes *nodes)
+double bending_energy(const Nodes *nodes, double normal_bending)
 {
     double sum = 0.0;
-    for (int64_t i = 0; i < nodes->n; i++)
+    for (int64_t i = 0; i < nodes->n; i++) {
         sum += nodes->angles[i] * nodes->angles[i] / arc_of_node(nodes, i);
+        if (normal_bending > 0.0) sum += normal_bending * normal_bending_of_step(nodes, i);
+    }
     return sum;
 }
 
-double scale_of_decrease(const Nodes *nodes, const Steps *found)
+double scale_of_decrease(const Nodes *nodes, const Steps *found, const Weights *weights)
 {
-    return greater(bending_energy(nodes), LEAST_BENDING * found->scale);
+    double bending = bending_energy(nodes, weights->normal_bending);
+    return greater(bending, LEAST_BENDING * found->scale);
 }
 
 /* Computes the energy and assembles the system of the present nodes. */
@@ -199,10 +207,11 @@ int take_steps(const Surface *surface, const RelaxationRules *rules, double negl
     TRY(linearise(surface, rules, weights, space, &found->before));
     found->after = found->scale = found->before;
     if (weights->frozen_ds) {
-        Weights without_map = {weights->tension, 0.0, 0.0, NULL};
+        Weights without_map = {.tension = weights->tension,
+                               .normal_bending = weights->normal_bending};
         found->scale = elastic_energy(&space->now, &without_map);
     }
-    double least = negligible * scale_of_decrease(&space->now, found);
+    double least = negligible * scale_of_decrease(&space->now, found, weights);
     do {
         TRY(take_step(surface, rules, weights, least, most_work, space, found, &is_lower, work));
         if (!is_lower || found->taken >= rules->steps.steps) break;

@@ -59,6 +59,9 @@ int64_t items_of_workspace(int64_t n, int64_t pair_room);
 int take_workspace(Scratch scratch, int64_t n, int64_t closed, int64_t pair_room,
                    Workspace *space);
 
+/* The nodes at which the curve may turn freely, (n); or NULL. */
+void set_corners(Workspace *space, const uint8_t *is_corner);
+
 /* The trial nodes become the present ones. */
 void take_trial(Workspace *space);
 
@@ -85,10 +88,10 @@ int energy_with_contact(const RelaxationRules *rules, const Nodes *nodes, const 
 int take_steps(const Surface *surface, const RelaxationRules *rules, double negligible,
                int64_t most_work, Workspace *space, Steps *found, Weights *weights, int64_t *work);
 
-/* Bending energy of a curve, in 1/length. */
-double bending_energy(const Nodes *nodes);
+/* Bending energy of a curve, in 1/length; the normal curvature counts with a weight. */
+double bending_energy(const Nodes *nodes, double normal_bending);
 
 /* The value that decreases are compared with: the bending energy, or a small part of the scale. */
-double scale_of_decrease(const Nodes *nodes, const Steps *found);
+double scale_of_decrease(const Nodes *nodes, const Steps *found, const Weights *weights);
 
 #endif

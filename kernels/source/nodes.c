@@ -14,6 +14,7 @@ int take_nodes(Scratch *scratch, int64_t n, int64_t closed, Nodes *nodes)
 {
     nodes->n = n;
     nodes->closed = closed;
+    nodes->is_corner = NULL;
     TRY(take_integers(scratch, n, &nodes->faces));
     TRY(take(scratch, 3 * n, &nodes->barycentric));
     TRY(take(scratch, 3 * n, &nodes->positions));
@@ -62,9 +63,9 @@ void measure_nodes(const Nodes *nodes)
     for (int64_t i = 0; i < nodes->n; i++) {
         const double *here = nodes->positions + 3 * i;
         const double *next = nodes->positions + 3 * node_after(nodes, i);
-        int has_step = nodes->closed || i < nodes->n - 1;
         double *step = nodes->steps + 3 * i;
-        for (int axis = 0; axis < 3; axis++) step[axis] = has_step ? next[axis] - here[axis] : 0.0;
+        for (int axis = 0; axis < 3; axis++)
+            step[axis] = has_step(nodes, i) ? next[axis] - here[axis] : 0.0;
         nodes->step_lengths[i] = length_of(step);
     }
     for (int64_t i = 0; i < nodes->n; i++) {
@@ -80,7 +81,7 @@ void measure_nodes(const Nodes *nodes)
         double length = greater(length_of(conormal), TINY);
         for (int axis = 0; axis < 3; axis++) conormal[axis] /= length;
         Turn turn = turn_at(before, after, normal);
-        nodes->angles[i] = is_open_end(nodes, i) ? 0.0 : angle_of(turn.sine, turn.cosine);
+        nodes->angles[i] = turns_freely(nodes, i) ? 0.0 : angle_of(turn.sine, turn.cosine);
     }
 }
 
@@ -98,7 +99,8 @@ EXPORTED int measure_curves(const Nodes *all, int64_t c)
                        .steps = all->steps + 3 * first,
                        .step_lengths = all->step_lengths + first,
                        .conormals = all->conormals + 3 * first,
-                       .angles = all->angles + first};
+                       .angles = all->angles + first,
+                       .is_corner = all->is_corner ? all->is_corner + first : NULL};
         measure_nodes(&nodes);
     }
     return OK;

@@ -17,7 +17,9 @@ typedef struct {
     double *steps;        /* (n, 3) to the next node; zero at the last node of an open curve */
     double *step_lengths; /* (n) */
     double *conormals;    /* (n, 3) unit vectors in the tangent planes, normal to the curve */
-    double *angles;       /* (n) turning in the tangent plane; zero at the ends of open curves */
+    double *angles;       /* (n) turning in the tangent plane; zero at the ends of open curves, and
+                             at corners */
+    const uint8_t *is_corner; /* (n) whether the curve may turn freely at each node; or NULL */
 } Nodes;
 
 static inline int64_t node_before(const Nodes *nodes, int64_t i)
@@ -30,9 +32,25 @@ static inline int64_t node_after(const Nodes *nodes, int64_t i)
     return i + 1 < nodes->n ? i + 1 : 0;
 }
 
-static inline int is_open_end(const Nodes *nodes, int64_t i)
+/* Whether the curve may turn freely at a node: at the ends of an open curve, and at corners. */
+static inline int turns_freely(const Nodes *nodes, int64_t i)
 {
-    return !nodes->closed && (i == 0 || i == nodes->n - 1);
+    int is_end = !nodes->closed && (i == 0 || i == nodes->n - 1);
+    return is_end || (nodes->is_corner && nodes->is_corner[i]);
+}
+
+/* Whether there is a step from a node to the next one. */
+static inline int has_step(const Nodes *nodes, int64_t i)
+{
+    return nodes->closed || i < nodes->n - 1;
+}
+
+/* -1 if the normals of two neighbouring nodes point to opposite sides of the surface, as on a
+   surface without an orientation; else 1. */
+static inline double side_of_next(const Nodes *nodes, int64_t i)
+{
+    const double *normal = nodes->normals + 3 * i;
+    return dot(normal, nodes->normals + 3 * node_after(nodes, i)) < 0.0 ? -1.0 : 1.0;
 }
 
 /* Arc length that belongs to a node: half the sum of its two steps. */

@@ -22,6 +22,7 @@ typedef struct {
     int64_t *faces;        /* (c, n) */
     double *barycentric;   /* (c, n, 3) */
     const uint8_t *fixed;  /* (c, n) nodes that do not move; the first of each curve is one */
+    const uint8_t *corners; /* (c, n) fixed nodes at which the curve may turn freely; or NULL */
     int64_t *iterations;   /* (c) number so far; that of the rules when a curve is done */
     int64_t *quiet;        /* (c) number of latest iterations that were quiet */
     double *dampings;      /* (c) of the next trial step */
@@ -57,6 +58,7 @@ static int relax_curve(const Surface *surface, const RelaxationRules *rules,
     Steps found = {.damping = curves->dampings[curve]};
     Weights weights;
     if (!are_finite(given.barycentric, 3 * n)) return NOT_FINITE;
+    set_corners(space, curves->corners ? curves->corners + curve * n : NULL);
     copy_places(&given, &space->now);
     TRY(locate_nodes(surface, &space->now));
     while (iteration < batch->iterations) {

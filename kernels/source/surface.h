@@ -11,6 +11,7 @@ typedef struct {
     const uint8_t *folded;        /* (F) whether a face is folded back over others; or NULL */
     const double *feature_map;    /* (V) phi_fea at the vertices; or NULL */
     double feature_weight;        /* factor of the map, in 1/length^2; 0 without a map */
+    double normal_bending;        /* weight of the normal curvature, squared, in the bending */
 } Surface;
 
 /* Vertex normals at the corners of a face, turned to the side of the face. */

@@ -69,7 +69,10 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         is_separate = self.output in writing.SEPARATE
         if is_separate:
             self._take_appearance(original, mesh_object)
-        summary = writing.apply(context, mesh_object, surface, curves, self, curve_settings)
+        corners = curve_record.corners_of(original)
+        summary = writing.apply(
+            context, mesh_object, surface, curves, self, curve_settings, corners
+        )
         if is_separate:
             converted = context.active_object
             for material in original.data.materials:

@@ -25,7 +25,15 @@ from .message_labels import draw_message
 Value = bool | float | str
 """A setting of a curve."""
 
-COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
+COURSE = (
+    "closed",
+    "smoothness",
+    "normal_bending",
+    "use_modifiers",
+    "obstacle_group",
+    "alignment_group",
+    "clearance",
+)
 DRAWING = ("spline", "offset")
 
 UNDO_DELAY = 0.3
@@ -121,7 +129,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
         record = curve[curve_record.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         try:
-            writing.redraw(curve, opened.surface, curves)
+            writing.redraw(curve, opened.surface, curves, opened.points.corners)
         except BaseException:
             if before is None:
                 del record["drawn"]
@@ -208,8 +216,8 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
-    layout.prop(values, "closed")
-    layout.prop(values, "smoothness")
+    for name in ("closed", "smoothness", "normal_bending"):
+        layout.prop(values, name)
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")
@@ -222,7 +230,7 @@ def draw(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     values = curve.nicmm_settings
     layout.use_property_split = True
     layout.use_property_decorate = False
-    for name in ("closed", "smoothness", "use_modifiers"):
+    for name in ("closed", "smoothness", "normal_bending", "use_modifiers"):
         layout.prop(values, name)
     for name in ("spline", "radius", "offset"):
         layout.prop(values, name)

@@ -53,6 +53,8 @@ class NICMM_OT_design_curve(
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
+    corners: settings.CORNERS
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         has_mesh = mesh_data.mesh_object(context) is not None
@@ -78,7 +80,12 @@ class NICMM_OT_design_curve(
                 "Alternatives are separate curves. Set Output to Curve or Sticky Curves, or set "
                 "Alternatives to 0"
             )
-        return [replace(request, options={**request.options, "alternatives": alternatives})]
+        corners = selection.given_corners(self.corners, len(points))
+        further = {
+            "alternatives": alternatives,
+            "corners": design_request.corner_indices(corners),
+        }
+        return [replace(request, options={**request.options, **further})]
 
     def _control_points(
         self, mesh_object: bpy.types.Object, surface: Surface
@@ -108,7 +115,13 @@ class NICMM_OT_design_curve(
         mesh_object = request.mesh_object()
         result = [
             writing.apply(
-                context, mesh_object, request.surface, each.curves, self, request.settings
+                context,
+                mesh_object,
+                request.surface,
+                each.curves,
+                self,
+                request.settings,
+                design_request.corners_of(request, each),
             )
             for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
-Key = tuple[str, bytes, bytes]
+Key = tuple[str, bytes, bytes, bytes]
 
 _found: "dict[Key, list[SurfaceCurve]]" = {}
 """The courses of the last search by what they depend on, so that a next call takes no time."""
@@ -97,9 +97,9 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
 
 def _key(opened: Opened) -> Key:
     """Everything that the courses of a curve depend on."""
-    points = opened.points
+    places, corners = opened.points.places, opened.points.corners
     on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
-    return on, points.faces.tobytes(), points.barycentric.tobytes()
+    return on, places.faces.tobytes(), places.barycentric.tobytes(), corners.tobytes()
 
 
 def _current(opened: Opened, courses: "list[SurfaceCurve]") -> int | None:

@@ -60,26 +60,53 @@ class Knots:
 Spline = Polyline | Knots
 
 
-def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list[Spline]:
-    """The splines that show curves, each a `Polyline` or `Knots`."""
+def splines(
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    drawing: Drawing,
+    corners: np.ndarray,
+) -> list[Spline]:
+    """The splines that show curves, each a `Polyline` or `Knots`.
+
+    `corners`, (k,), tells which of their control points are corners, where the handles of knots are
+    free.
+    """
     if drawing.spline == BEZIER:
-        return [_knots(surface, curve, drawing) for curve in curves]
+        return [
+            _knots(surface, curve, drawing, sharp)
+            for curve, sharp in zip(curves, _indices(curves, corners), strict=True)
+        ]
     return [
         Polyline(curve.closed, _offset_points(surface, curve, drawing.offset))
-        for curve in on_surface(surface, curves, drawing)
+        for curve in on_surface(surface, curves, drawing, corners)
     ]
 
 
 def on_surface(
-    surface: Surface, curves: list[SurfaceCurve], drawing: Drawing
+    surface: Surface, curves: list[SurfaceCurve], drawing: Drawing, corners: np.ndarray
 ) -> Sequence[SurfaceCurve | SampledCurve]:
-    """Curves of the core whose points are those of the polylines to draw."""
+    """Curves of the core whose points are those of the polylines to draw.
+
+    They have a point at every control point. `corners`, (k,), tells which of these are corners;
+    evenly spaced points are close to these, so that a tube is not thinner further away.
+    """
     if drawing.spline == EXACT:
         return curves
     from ...nicmm_core.splines.even_spacing import even_curve
 
     mesh = surface_cache.core_mesh(surface)
-    return [even_curve(mesh, curve, _tolerance(surface, mesh, drawing)) for curve in curves]
+    tolerance, radius = _tolerance(surface, mesh, drawing), drawing.radius / surface.unit
+    return [
+        even_curve(mesh, curve, tolerance, sharp, beside=radius)
+        for curve, sharp in zip(curves, _indices(curves, corners), strict=True)
+    ]
+
+
+def _indices(curves: list[SurfaceCurve], corners: np.ndarray) -> list[np.ndarray]:
+    """The indices of corners among the points of each curve."""
+    passed = [curve.control_index[curve.control_index >= 0] for curve in curves]
+    sharp = np.split(corners, np.cumsum([len(index) for index in passed]))[:-1]
+    return [index[here] for index, here in zip(passed, sharp, strict=True)]
 
 
 def automatic_radius(surface: Surface, radius: float, thickness: float) -> float:
@@ -87,18 +114,20 @@ def automatic_radius(surface: Surface, radius: float, thickness: float) -> float
     return radius or thickness * surface.diagonal * surface.scale
 
 
-def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing) -> Knots:
+def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing, corners: np.ndarray) -> Knots:
+    """Knots on a curve; their handles are free at the points with the indices `corners`."""
     from ...nicmm_core.splines.bezier import fit_bezier
 
     mesh = surface_cache.core_mesh(surface)
     points = _offset_points(surface, curve, drawing.offset) @ surface.local_to_core.T
     tolerance = _tolerance(surface, mesh, drawing)
-    fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance)
+    fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance, corners)
     back = np.linalg.inv(surface.local_to_core).T
     left, right = fitted.left - fitted.knots, fitted.right - fitted.knots
     across = np.linalg.norm(np.cross(left, right), axis=1)
     sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=1)
     smooth = (across <= COLLINEAR * sizes) & (np.einsum("nj,nj->n", left, right) < 0.0)
+    smooth[fitted.control_index[np.isin(curve.control_index, corners)]] = False
     return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...nicmm_core.options import FEWEST_OPEN
 from ..scene import curve_record, design_request, mesh_data, surface_cache
+from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
 from ..scene.lookup import by_uid
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
+
+SAME_COURSE = ("smoothness", "normal_bending")
+"""Settings with whose change a curve keeps its course."""
 
 DELETED = "The curve was deleted while it was being designed. Undo to bring it back"
 MESH_DELETED = "The mesh was deleted while a curve was being drawn on it. Undo to bring it back"
@@ -44,7 +48,7 @@ class Opened:
         The current surface.
     settings : CurveSettings
         Settings of the curve.
-    points : SurfacePoints of the core
+    points : ControlPoints
         Control points on the surface.
     curve : SurfaceCurve of the core, or None
         The recorded curve; None if the curve is new or has to be designed again.
@@ -56,7 +60,7 @@ class Opened:
     mesh_uid: int
     surface: Surface
     settings: CurveSettings
-    points: SurfacePoints
+    points: ControlPoints
     curve: SurfaceCurve | None
     remark: str
 
@@ -75,11 +79,16 @@ class Opened:
 
     def positions(self) -> np.ndarray:
         """Positions of the control points in the object's local space, (k, 3)."""
-        return self.surface.points(self.points.faces, self.points.barycentric)
+        return positions_of(self.surface, self.points)
 
     def polyline(self) -> np.ndarray:
         """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
         return polyline_of(self.surface, self.curve)
+
+
+def positions_of(surface: Surface, points: ControlPoints) -> np.ndarray:
+    """Positions of control points in the object's local space, (k, 3)."""
+    return surface.points(points.places.faces, points.places.barycentric)
 
 
 def polyline_of(surface: Surface, curve: SurfaceCurve | None) -> np.ndarray:
@@ -138,8 +147,8 @@ def open_curve(
     settings : CurveSettings, optional
         Settings to use instead of those of the curve, or of the sidebar for a new curve.
     keeps_course : bool, default False
-        Whether the curve keeps its course if only the smoothness differs. With any other change of
-        settings it is designed from scratch, because another course may be the best one.
+        Whether the curve keeps its course if only settings of `SAME_COURSE` differ. With any other
+        change of settings it is designed from scratch, because another course may be the best one.
     """
     from ... import nicmm_core as nicmm
 
@@ -165,7 +174,8 @@ def open_curve(
         if edited is not None and group and group not in mesh_object.vertex_groups:
             settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
-    points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+    none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+    points = ControlPoints(none, np.zeros(0, dtype=bool))
     curve = None
     if edited is not None:
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
@@ -174,8 +184,8 @@ def open_curve(
             remarks.append(f"the mesh has changed: {points_moved}")
         else:
             kept = replace(settings, method=before.method)
-            if keeps_course:
-                kept = replace(kept, smoothness=before.smoothness)
+            for name in SAME_COURSE if keeps_course else ():
+                kept = kept.with_value(name, getattr(before, name))
             if kept == before:
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
@@ -183,7 +193,7 @@ def open_curve(
     return Opened(uid, mesh_object.session_uid, surface, settings, points, curve, remark)
 
 
-def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
+def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:
         return []
@@ -209,7 +219,7 @@ def design_of(answer: Answer) -> Design:
 def write(
     context: bpy.types.Context,
     edited: Opened,
-    points: SurfacePoints,
+    points: ControlPoints,
     curves: list[SurfaceCurve],
     settings: ObjectSettings,
 ) -> bpy.types.Object:
@@ -220,18 +230,18 @@ def write(
     if edited.curve_uid:
         return rewrite(edited, points, curves)
     mesh_object = edited.mesh_object
-    result = writing.as_object(mesh_object, edited.surface, curves, settings)
+    result = writing.as_object(mesh_object, edited.surface, curves, settings, points.corners)
     _record(result, mesh_object, edited, points, curves, writing.drawn_as(settings))
     curve_object.place(context, mesh_object, result)
     return result
 
 
-def rewrite(edited: Opened, points: SurfacePoints, curves: list[SurfaceCurve]) -> bpy.types.Object:
+def rewrite(edited: Opened, points: ControlPoints, curves: list[SurfaceCurve]) -> bpy.types.Object:
     """Write curves through points to the curve object, and return it."""
     result, mesh_object = edited.curve_object, edited.mesh_object
     if result is None:
         raise InputError(DELETED)
-    writing.redraw(result, edited.surface, curves)
+    writing.redraw(result, edited.surface, curves, points.corners)
     drawn = curve_record.drawn_as(result)
     _record(result, mesh_object, edited, points, curves, drawn)
     return result
@@ -241,13 +251,20 @@ def _record(
     result: bpy.types.Object,
     mesh_object: bpy.types.Object,
     edited: Opened,
-    points: SurfacePoints,
+    points: ControlPoints,
     curves: list[SurfaceCurve],
     drawn: Drawn | None,
 ) -> None:
     curve_settings = replace(edited.settings, method="ELASTIC")
     curve_record.write_record(
-        result, mesh_object, edited.surface, curves, curve_settings, drawn, points
+        result,
+        mesh_object,
+        edited.surface,
+        curves,
+        curve_settings,
+        drawn,
+        points.corners,
+        points.places,
     )
 
 
@@ -273,23 +290,34 @@ def nearest_surface_points(edited: Opened, positions: np.ndarray) -> SurfacePoin
 
 
 def with_point(
-    points: SurfacePoints, number: int, place: SurfacePoints, replaced: bool = False
-) -> SurfacePoints:
-    """Points with the single point `place` inserted at an index, or replacing the point there."""
+    points: ControlPoints, number: int, place: SurfacePoints, replaced: bool = False
+) -> ControlPoints:
+    """Points with the single point `place` inserted at an index, or replacing the point there.
+
+    A replaced point stays a corner; an inserted one is none.
+    """
     from ... import nicmm_core as nicmm
 
-    rest = points
-    if replaced:
-        rest = points[np.delete(np.arange(len(points)), number)]
-    return nicmm.SurfacePoints(
-        np.insert(rest.faces, number, place.faces[0]),
-        np.insert(rest.barycentric, number, place.barycentric[0], axis=0),
+    rest = without_point(points, number) if replaced else points
+    is_corner = bool(points.corners[number]) if replaced else False
+    places = nicmm.SurfacePoints(
+        np.insert(rest.places.faces, number, place.faces[0]),
+        np.insert(rest.places.barycentric, number, place.barycentric[0], axis=0),
     )
+    return ControlPoints(places, np.insert(rest.corners, number, is_corner))
 
 
-def without_point(points: SurfacePoints, number: int) -> SurfacePoints:
+def without_point(points: ControlPoints, number: int) -> ControlPoints:
     """Points without the one at an index."""
-    return points[np.delete(np.arange(len(points)), number)]
+    kept = np.delete(np.arange(len(points)), number)
+    return ControlPoints(points.places[kept], points.corners[kept])
+
+
+def with_toggled_corner(points: ControlPoints, number: int) -> ControlPoints:
+    """Points of which the one at an index has become a corner, or is none any more."""
+    corners = points.corners.copy()
+    corners[number] = not corners[number]
+    return replace(points, corners=corners)
 
 
 def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:

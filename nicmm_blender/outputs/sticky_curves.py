@@ -40,6 +40,7 @@ def add(
     surface: Surface,
     curves: list[SurfaceCurve],
     drawing: Drawing,
+    corners: np.ndarray,
     tube: bool,
 ) -> bpy.types.Object:
     """Create the hair curves object without linking it to a collection."""
@@ -47,7 +48,7 @@ def add(
     curve_object = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
     parent_to_mesh(curve_object, mesh_object, surface)
     try:
-        write(curve_object, surface, curves, drawing)
+        write(curve_object, surface, curves, drawing, corners)
     except BaseException:
         data = curve_object.data
         bpy.data.objects.remove(curve_object)
@@ -62,14 +63,21 @@ def add(
 
 
 def write(
-    curve_object: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve], drawing: Drawing
+    curve_object: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    drawing: Drawing,
+    corners: np.ndarray,
 ) -> None:
-    """Replace the curves of a hair curves object; the radii along them are kept."""
+    """Replace the curves of a hair curves object; the radii along them are kept.
+
+    `corners`, (k,), tells which of their control points are corners.
+    """
     data = curve_object.data
     radii = _radii(data)
     if not len(data.points):
         radii = np.zeros(1), np.array([drawing.radius / scale_of(curve_object, surface)])
-    shown = on_surface(surface, curves, drawing)
+    shown = on_surface(surface, curves, drawing, corners)
     if len(data.curves):
         data.remove_curves()
     if not shown:

@@ -13,7 +13,7 @@ import bmesh
 
 from ..scene import curve_record
 from ..scene.curve_record import CurveSettings, Drawn
-from ..scene.design_request import DesignRequest
+from ..scene.design_request import DesignRequest, corners_of
 from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.surface import Surface
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
@@ -82,15 +82,18 @@ def apply(
     curves: list[SurfaceCurve],
     settings: OutputSettings,
     curve_settings: CurveSettings,
+    corners: np.ndarray,
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
-    `settings` holds the output settings, `curve_settings` the settings of the curves.
+    `settings` holds the output settings, `curve_settings` the settings of the curves, and
+    `corners`, (k,), tells which of their control points are corners.
     """
     if settings.output in SEPARATE:
-        new_object = as_object(mesh_object, surface, curves, settings)
+        new_object = as_object(mesh_object, surface, curves, settings, corners)
+        drawn = drawn_as(settings)
         curve_record.write_record(
-            new_object, mesh_object, surface, curves, curve_settings, drawn_as(settings)
+            new_object, mesh_object, surface, curves, curve_settings, drawn, corners
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
@@ -115,21 +118,32 @@ def as_object(
     surface: Surface,
     curves: list[SurfaceCurve],
     settings: ObjectSettings,
+    corners: np.ndarray,
 ) -> bpy.types.Object:
-    """Create an object that shows curves, without linking it to a collection."""
+    """Create an object that shows curves, without linking it to a collection.
+
+    `corners`, (k,), tells which of their control points are corners.
+    """
     for name in ("radius", "thickness", "offset"):
         check_finite(name, getattr(settings, name))
     radius = automatic_radius(surface, settings.radius, settings.thickness)
     drawing = Drawing(settings.spline, radius, settings.offset)
     if settings.output == "STICKY":
-        return sticky_curves.add(mesh_object, surface, curves, drawing, settings.tube)
-    return curve_object.new_object(mesh_object, surface, splines(surface, curves, drawing), radius)
+        return sticky_curves.add(mesh_object, surface, curves, drawing, corners, settings.tube)
+    shown = splines(surface, curves, drawing, corners)
+    return curve_object.new_object(mesh_object, surface, shown, radius)
 
 
-def redraw(drawn: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
+def redraw(
+    drawn: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    corners: np.ndarray,
+) -> None:
     """Replace the curves in a curve object; its radius, materials and modifiers are kept.
 
-    A linked duplicate gets data of its own, since its record describes only its own curve.
+    `corners`, (k,), tells which of their control points are corners. A linked duplicate gets data
+    of its own, since its record describes only its own curve.
     """
     if drawn.data.users - drawn.data.use_fake_user > 1:
         drawn.data = drawn.data.copy()
@@ -141,9 +155,9 @@ def redraw(drawn: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]
     radius = tube_radius.radius_of(drawn) * curve_object.scale_of(drawn, surface)
     drawing = Drawing(radius=radius, **kind)
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn, surface, curves, drawing)
+        sticky_curves.write(drawn, surface, curves, drawing, corners)
     else:
-        curve_object.write_splines(drawn, splines(surface, curves, drawing))
+        curve_object.write_splines(drawn, splines(surface, curves, drawing, corners))
 
 
 def _parent_again(drawn: bpy.types.Object, surface: Surface) -> None:
@@ -162,10 +176,11 @@ def show_unfinished(drawn: bpy.types.Object, surface: Surface, curve: SurfaceCur
     """Show a curve that is being changed in its object, with all points of the exact curve."""
     kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
     drawing = Drawing(EXACT, 0.0, kind["offset"])
+    no_corners = np.zeros(0, dtype=bool)  # exact curves are sharp anyway
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn, surface, [curve], drawing)
+        sticky_curves.write(drawn, surface, [curve], drawing, no_corners)
     else:
-        curve_object.write_splines(drawn, splines(surface, [curve], drawing))
+        curve_object.write_splines(drawn, splines(surface, [curve], drawing, no_corners))
 
 
 def drawn_as(settings: ObjectSettings) -> Drawn:
@@ -207,7 +222,8 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         raise InputError(str(answer)) from answer
     if not answer.curves:
         raise InputError(sentence(str(answer.status)))
-    redraw(designed, request.surface, answer.curves)
+    corners = corners_of(request, answer)
+    redraw(designed, request.surface, answer.curves, corners)
     curve_record.write_record(
         designed,
         request.mesh_object(),
@@ -215,6 +231,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         answer.curves,
         request.settings,
         curve_record.drawn_as(designed),
+        corners,
     )
 
 

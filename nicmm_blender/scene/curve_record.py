@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import bpy
 import numpy as np
 
-from ...nicmm_core.options import OPTIONS, Kind
+from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
 from . import mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
+from .control_points import ControlPoints
 from .lookup import is_in
 from .messages import InputError, check_finite
 from .record_check import Record
@@ -67,7 +68,8 @@ def property_name(option: Option) -> str:
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
-WITHOUT_MODIFIERS = ", use_modifiers=False"
+UNCHANGED = (", use_modifiers=False", ", normal_bending=0.0")
+"""Settings whose values were the only ones before there were these settings."""
 
 NEW_CURVE_OPTIONS = ("order", "alternatives")
 """Options that matter only once, since control points are stored in the order visited."""
@@ -75,7 +77,7 @@ NEW_CURVE_OPTIONS = ("order", "alternatives")
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind not in (Kind.POINTS, Kind.CURVES) and option.name not in NEW_CURVE_OPTIONS
+    if option.kind not in COMPOUND_KINDS and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 
@@ -87,6 +89,7 @@ class CurveSettings:
     closed: bool = True
     method: str = "ELASTIC"
     smoothness: float = 1.0
+    normal_bending: float = 0.0
     obstacle_group: str = ""
     clearance: float = 0.0
     alignment_group: str = ""
@@ -125,7 +128,9 @@ def arguments_of(
             value = value.lower().replace("_", "-")
         values[option.name] = value
     for option in RECORDED:
-        if option.needs and all(values.get(name) is None for name in option.needs):
+        is_of_no_use = option.elastic_only and settings.method != "ELASTIC"
+        lacks = option.needs and all(values.get(name) is None for name in option.needs)
+        if is_of_no_use or lacks:
             values[option.name] = option.default
     return values
 
@@ -144,6 +149,7 @@ def write_record(
     curves: list[SurfaceCurve],
     settings: CurveSettings,
     drawn: Drawn | None,
+    corners: np.ndarray,
     controls: SurfacePoints | None = None,
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
@@ -163,6 +169,8 @@ def write_record(
     drawn : dict or None
         Spline type and offset of the drawing; None for an object of an earlier version, which drew
         all points.
+    corners : (k,) bool array
+        Whether each control point is a corner.
     controls : SurfacePoints, optional
         Control points; by default those of the curves.
     """
@@ -194,6 +202,7 @@ def write_record(
         "control_corners": surface.faces[control_faces].ravel().tolist(),
         "control_barycentric": control_barycentric.ravel().tolist(),
         **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
+        "corner_points": corners.astype(int).tolist(),
         "asked": asdict(settings),
         **({} if drawn is None else {"drawn": drawn}),
     }
@@ -214,7 +223,8 @@ def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSetti
     former = {now: before for before, now in FORMER_METHODS.items()}
     settings = settings.with_value("method", former.get(settings.method, settings.method))
     words = "Asked" + repr(settings).removeprefix(CurveSettings.__name__)
-    words = words.replace(WITHOUT_MODIFIERS, "")
+    for setting in UNCHANGED:
+        words = words.replace(setting, "")
     found = hashlib.blake2b(words.encode(), digest_size=16)
     found.update(surface.core_positions.tobytes())
     found.update(surface.faces.tobytes())
@@ -472,7 +482,7 @@ def read_control_points(
 
 def current_control_points(
     curve_object: bpy.types.Object, mesh_object: bpy.types.Object, surface: Surface
-) -> tuple[SurfacePoints, int]:
+) -> tuple[ControlPoints, int]:
     """The control points of a curve on the current surface, and how many of them were moved.
 
     A point whose triangle no longer exists is located by the face of the cage that it came from. If
@@ -497,7 +507,18 @@ def current_control_points(
         mesh = surface_cache.core_mesh(surface)
         nearest, _ = nearest_points(mesh, positions[lost] @ surface.local_to_core.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
-    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
+    places = nicmm.SurfacePoints(faces, barycentric)
+    return ControlPoints(places, corners_of(curve_object)), int(lost.sum())
+
+
+def corners_of(curve_object: bpy.types.Object) -> np.ndarray:
+    """Whether each control point of a curve is a corner, (k,)."""
+    record = _checked_record(curve_object)
+    if "control_corners" not in record:  # an early record without control points
+        return np.zeros(sum(index >= 0 for index in record["control_index"]), dtype=bool)
+    if "corner_points" not in record:  # of a version without corners
+        return np.zeros(len(record["control_corners"]) // 3, dtype=bool)
+    return np.array(record["corner_points"], dtype=bool)
 
 
 def _cage_points(

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
 from . import curve_record, surface_cache
+from .control_points import ControlPoints
 from .curve_record import CurveSettings
 from .lookup import by_uid
 from .messages import InputError, user_message
@@ -112,12 +113,27 @@ def for_points(
 
 
 def for_drawing(
-    mesh_object: bpy.types.Object, surface: Surface, points: SurfacePoints, settings: CurveSettings
+    mesh_object: bpy.types.Object, surface: Surface, points: ControlPoints, settings: CurveSettings
 ) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
-    request = for_points(mesh_object, surface, points, "given", settings)
+    request = for_points(mesh_object, surface, points.places, "given", settings)
     closed = settings.closed and len(points) >= FEWEST_CLOSED
-    return replace(request, options={**request.options, "closed": closed})
+    # Other methods have no corners.
+    corners = corner_indices(points.corners) if settings.method == "ELASTIC" else None
+    return replace(request, options={**request.options, "closed": closed, "corners": corners})
+
+
+def corner_indices(corners: np.ndarray) -> list[int] | None:
+    """The argument `corners` of the core for control points that are corners or not, (k,)."""
+    return np.flatnonzero(corners).tolist() or None
+
+
+def corners_of(request: DesignRequest, design: Design) -> np.ndarray:
+    """Whether each control point of a designed curve is a corner, in the order visited, (k,)."""
+    if design.resumable is None:  # of a method without corners
+        passed = [curve.control_index >= 0 for curve in design.curves]
+        return np.zeros(np.concatenate(passed).sum(), dtype=bool)
+    return np.isin(design.resumable.visited, request.options["corners"] or [])
 
 
 def for_curve(

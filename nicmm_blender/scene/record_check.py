@@ -69,6 +69,11 @@ def _check_points(record: Record) -> None:
         raise _DamagedError("the length of control_corners is not a multiple of three")
     _numbers(record, "control_barycentric", len(controls))
     _numbers(record, "control_positions", len(controls))
+    if (
+        "corner_points" in record
+        and (_whole(record, "corner_points", len(controls) // 3, least=0) > 1).any()
+    ):
+        raise _DamagedError("corner_points has values other than 0 and 1")
     if not len(counts) and (len(closed) or len(control_counts)):
         raise _DamagedError("it has settings of a curve but no curve")
     if len(record.get("cage", ())):

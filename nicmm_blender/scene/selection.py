@@ -108,6 +108,19 @@ def given_points(surface: Surface, text: str, order: str) -> tuple[np.ndarray | 
     return np.array(places), core_order
 
 
+def given_corners(text: str, count: int) -> np.ndarray:
+    """Whether each of `count` control points is a corner, (count,), from indices as text."""
+    corners = np.zeros(count, dtype=bool)
+    for word in text.split(",") if text.strip() else ():
+        if not (word.strip().isdecimal() and int(word) < count):
+            raise InputError(
+                f'The corner "{word.strip()}" is not the index of a control point, 0 to '
+                f'{count - 1}. Separate indices by commas, such as "0, 2"'
+            )
+        corners[int(word)] = True
+    return corners
+
+
 def points_at(surface: Surface, vertices: np.ndarray) -> np.ndarray | SurfacePoints:
     """Points for the core at vertices (k,) of the mesh.
 

@@ -15,6 +15,7 @@ from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..outputs.writing import SEPARATE
 from ..scene import curve_record
+from ..scene.control_points import ControlPoints
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
 from . import modes
@@ -40,7 +41,7 @@ class ChangesPoints(LongSolves):
         dragged: SurfacePoints | None
     dragged = None
 
-    def changed(self, opened: Opened) -> SurfacePoints:
+    def changed(self, opened: Opened) -> ControlPoints:
         """The control points after the change."""
         raise NotImplementedError
 

@@ -13,13 +13,14 @@ from ..operators.error_reports import with_error_reports
 from ..operators.long_solves import answer_now
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
-from ..scene import curve_record
+from ..scene import curve_record, selection
+from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError
 from . import modes
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ...nicmm_core import SurfaceCurve
 
 OBJECT_SETTINGS = ("spline", "radius", "thickness", "offset")
 """Properties of a new curve object, shown in the redo panel."""
@@ -71,6 +72,8 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         options={"SKIP_SAVE", "HIDDEN"},
     )
 
+    corners: settings.CORNERS
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         has_mesh = curve_record.mesh_of_context(context) is not None
@@ -83,7 +86,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         mesh_object = curve_record.mesh_of_context(context)
-        for name in ("closed", "smoothness", "use_modifiers"):
+        for name in ("closed", "smoothness", "normal_bending", "use_modifiers"):
             layout.prop(self, name)
         for name in edited_curve.MAPS:
             layout.prop_search(self, name, mesh_object, "vertex_groups")
@@ -123,13 +126,16 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         points = opened.points
         if len(self.points):
             positions = np.array([point.position[:] for point in self.points])
-            points = edited_curve.surface_points_at(opened, positions, "points")
+            places = edited_curve.surface_points_at(opened, positions, "points")
+            points = ControlPoints(places, np.zeros(len(places), dtype=bool))
         elif edited is None:
             raise InputError(
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
                 "z)}, …], or draw with the Surface Curve tool in the 3D viewport"
             )
-        if len(self.points) or opened.curve is None:
+        if self.properties.is_property_set("corners"):
+            points = replace(points, corners=selection.given_corners(self.corners, len(points)))
+        if points is not opened.points or opened.curve is None:
             curves = _design_curves(context, opened, points)
         else:
             curves = [opened.curve]
@@ -153,17 +159,18 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         }
         return replace(curve_settings, method="ELASTIC", **given)
 
-    def _store(self, opened: Opened, points: "SurfacePoints") -> None:
+    def _store(self, opened: Opened, points: ControlPoints) -> None:
         """Store points and settings for the redo panel."""
         for name in settings.EditingProperties.__annotations__:
             setattr(self, name, getattr(opened.settings, name))
         self.points.clear()
-        for position in opened.surface.points(points.faces, points.barycentric):
+        for position in edited_curve.positions_of(opened.surface, points):
             self.points.add().position = position
+        self.corners = ", ".join(map(str, np.flatnonzero(points.corners)))
 
 
 def _design_curves(
-    context: bpy.types.Context, opened: Opened, points: "SurfacePoints"
+    context: bpy.types.Context, opened: Opened, points: ControlPoints
 ) -> "list[SurfaceCurve]":
     """The curve through points, as a list; an error if there is none."""
     requests = edited_curve.request(opened, points)

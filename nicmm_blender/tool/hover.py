@@ -7,7 +7,6 @@ Blender asks gizmos about every mouse move in a viewport, so no operator has to 
 import bpy
 import numpy as np
 
-from ..scene.messages import InputError
 from . import modes, overlay, picking
 
 
@@ -18,23 +17,8 @@ class NICMM_GT_hover(bpy.types.Gizmo):
         """Draw nothing, since the overlay draws the mark."""
 
     def test_select(self, context: bpy.types.Context, location: tuple[int, int]) -> int:
-        overlay.show_hover(_under(context, location))
+        overlay.show_hover(picking.under_mouse_now(context, np.array(location, dtype=np.float64)))
         return -1
-
-
-def _under(context: bpy.types.Context, location: tuple[int, int]) -> picking.Hit | None:
-    """What is under the mouse, or None if that would need a long computation."""
-    from ...nicmm_core import NicmmError
-
-    if not picking.is_view(context):
-        return None
-    try:
-        mesh_object, curve = picking.mesh_and_curve(context)
-        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
-            return None
-        return picking.under_mouse(context, np.array(location, dtype=np.float64))
-    except (InputError, NicmmError):
-        return None  # a click reports the error
 
 
 class NICMM_GGT_hover(bpy.types.GizmoGroup):

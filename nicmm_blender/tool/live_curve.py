@@ -15,7 +15,8 @@ from ..scene.design_request import DesignRequest
 from ..scene.messages import user_message
 
 if TYPE_CHECKING:
-    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core import Design, SurfaceCurve
+    from ..scene.control_points import ControlPoints
 
 ITERATIONS = 3
 """Maximum number of iterations for each move; they take one or two frames."""
@@ -55,9 +56,9 @@ class LiveCurve:
         found = self.request.start
         return found.curves[0] if isinstance(found, nicmm.Design) else found
 
-    def move(self, points: SurfacePoints) -> None:
+    def move(self, points: ControlPoints) -> None:
         """Move the control points and take a first step."""
-        self.request = replace(self.request, points=points)
+        self.request = replace(self.request, points=points.places)
         self.waiting, self.steps_left = self.request.start is None, MOST_STEPS
         if not self.waiting:
             self.step()

@@ -27,7 +27,8 @@ from .picking import Kind
 from .view import OFFSET, View
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ...nicmm_core import SurfaceCurve
+    from ..scene.control_points import ControlPoints
 
 Colour = tuple[float, ...]
 """Red, green and blue, and possibly opacity."""
@@ -38,8 +39,8 @@ HIDDEN = 0.22
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
 """Sizes in pixels at a resolution scale of 1."""
 
-CORNERS = 20
-"""Number of corners of the disc that shows a point."""
+DISC_SIDES = 20
+"""Number of sides of the polygon that shows a point."""
 
 OUTLINE = (0.05, 0.05, 0.05)
 """Dark colour under every line and point, so that they stand out from any theme colour."""
@@ -47,11 +48,15 @@ OUTLINE = (0.05, 0.05, 0.05)
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Points, (k, 3), and line, (n, 3), in the local space of a mesh object."""
+    """Points, (k, 3), and line, (n, 3), in the local space of a mesh object.
+
+    `corners`, (k,), tells which of the points are corners.
+    """
 
     mesh_uid: int
     surface: Surface
     points: np.ndarray
+    corners: np.ndarray
     line: np.ndarray
     problem: str = ""
     radius: float = 0.0
@@ -78,14 +83,15 @@ _state = _State()
 
 
 def show_dragged(
-    opened: Opened, points: SurfacePoints, curve: SurfaceCurve | None, problem: str = ""
+    opened: Opened, points: ControlPoints, curve: SurfaceCurve | None, problem: str = ""
 ) -> None:
     """Draw a curve that is being changed instead of the active one."""
     _state.hover = None
     _state.dragged = _Drawn(
         opened.mesh_uid,
         opened.surface,
-        opened.surface.points(points.faces, points.barycentric),
+        edited_curve.positions_of(opened.surface, points),
+        points.corners,
         edited_curve.polyline_of(opened.surface, curve),
         problem,
         _radius_of(opened),
@@ -126,8 +132,9 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
-    points, line = opened.positions(), opened.polyline()
-    return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
+    points, line, radius = opened.positions(), opened.polyline(), _radius_of(opened)
+    corners = opened.points.corners
+    return _Drawn(opened.mesh_uid, opened.surface, points, corners, line, "", radius)
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
@@ -203,7 +210,7 @@ def _draw_points() -> None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)
     colours = _Colours(context)
-    positions, marked = drawn.points, -1
+    positions, corners, marked = drawn.points, drawn.corners, -1
     fills = [colours.point] * len(positions)
     hit = _hover_on(drawn)
     if hit is not None:
@@ -212,26 +219,28 @@ def _draw_points() -> None:
         elif hit.kind in {Kind.LINE, Kind.SURFACE}:
             marked = len(positions)
             positions = np.concatenate([positions, [hit.position]])
+            corners = np.append(corners, False)
             fills.append(colours.hover)
     if not len(positions):
         return
     centres, visible = view.project(positions), _visible(view, positions)
     scale = context.preferences.system.ui_scale
-    corners, colour_of = [], []
+    outlines, colour_of = [], []
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
         opacity = 1.0 if visible[number] else HIDDEN
         size = 0.6 if number == marked else 1.0  # smaller where a click would add a point
+        shape = _SQUARE if corners[number] else _DISC
         for radius, colour in (
             (POINT_RADIUS + OUTLINE_WIDTH, OUTLINE),
             (POINT_RADIUS, fills[number]),
         ):
-            corners.append(centres[number] + size * scale * radius * _DISC)
-            colour_of.append(np.tile((*colour[:3], opacity), (len(_DISC), 1)))
-    if not corners:
+            outlines.append(centres[number] + size * scale * radius * shape)
+            colour_of.append(np.tile((*colour[:3], opacity), (len(shape), 1)))
+    if not outlines:
         return
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    flat = np.concatenate(corners)
+    flat = np.concatenate(outlines)
     batch = batch_for_shader(
         shader,
         "TRIS",
@@ -264,12 +273,15 @@ class _Colours:
 
 def _disc() -> np.ndarray:
     """Triangles of a disc of radius 1, as consecutive corners, (n, 2)."""
-    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    angles = np.linspace(0.0, 2.0 * np.pi, DISC_SIDES + 1)
     rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return np.stack([np.zeros((CORNERS, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
+    return np.stack([np.zeros((DISC_SIDES, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
 
 
 _DISC = _disc()
+
+_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+"""Triangles of the square that shows a corner."""
 
 
 def _towards_the_eye(

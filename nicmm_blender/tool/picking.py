@@ -183,6 +183,21 @@ def under_mouse(context: bpy.types.Context, pixel: np.ndarray) -> Hit | None:
     return hit
 
 
+def under_mouse_now(context: bpy.types.Context, pixel: np.ndarray) -> Hit | None:
+    """What is under the mouse at a pixel; also None if that would need a long computation."""
+    from ...nicmm_core import NicmmError
+
+    if not is_view(context):
+        return None
+    try:
+        mesh_object, curve = mesh_and_curve(context)
+        if mesh_object is None or not is_ready(context, mesh_object, curve):
+            return None
+        return under_mouse(context, pixel)
+    except (InputError, NicmmError):
+        return None  # a click reports the error
+
+
 def _hit(
     context: bpy.types.Context,
     view: View,

@@ -4,8 +4,6 @@
 Each has a full `execute` and is one undo step. The only state is the curve object with its record.
 """
 
-from typing import TYPE_CHECKING
-
 import bpy
 
 from ..operators import polls
@@ -13,14 +11,12 @@ from ..operators.error_reports import with_error_reports
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record
+from ..scene.control_points import ControlPoints
 from ..scene.messages import InputError
 from ..settings import CURVE
-from . import modes
+from . import modes, picking
 from .changes_points import ChangesPoints
 from .point_drag import PointDrag
-
-if TYPE_CHECKING:
-    from ...nicmm_core import SurfacePoints
 
 POSITION = bpy.props.FloatVectorProperty(
     name="Position",
@@ -53,7 +49,7 @@ class NICMM_OT_add_point(PointDrag, bpy.types.Operator):
     def open_curve(self, context: bpy.types.Context) -> Opened:
         return edited_curve.open_curve(context, edited_curve.chosen(context, self.curve))
 
-    def changed(self, opened: Opened) -> "SurfacePoints":
+    def changed(self, opened: Opened) -> ControlPoints:
         return edited_curve.with_point(opened.points, len(opened.points), self.place(opened))
 
 
@@ -74,7 +70,7 @@ class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def changed(self, opened: Opened) -> "SurfacePoints":
+    def changed(self, opened: Opened) -> ControlPoints:
         count = len(opened.points)
         if self.index != count:
             self.checked_index(opened)
@@ -93,7 +89,7 @@ class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def changed(self, opened: Opened) -> "SurfacePoints":
+    def changed(self, opened: Opened) -> ControlPoints:
         number = self.checked_index(opened)
         return edited_curve.with_point(opened.points, number, self.place(opened), replaced=True)
 
@@ -108,8 +104,31 @@ class NICMM_OT_remove_point(ChangesPoints, bpy.types.Operator):
     curve: CURVE
     index: INDEX
 
-    def changed(self, opened: Opened) -> "SurfacePoints":
+    def changed(self, opened: Opened) -> ControlPoints:
         return edited_curve.without_point(opened.points, self.checked_index(opened))
+
+
+class NICMM_OT_toggle_corner(ChangesPoints, bpy.types.Operator):
+    """Let the curve turn freely at a control point, or make it smooth there again"""
+
+    bl_idname = "nicmm.toggle_corner"
+    bl_label = "Toggle Corner"
+    bl_options = {"REGISTER", "UNDO"}
+
+    curve: CURVE
+    index: INDEX
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Toggle the point with the given index, or else the one under the mouse."""
+        if not self.properties.is_property_set("index"):
+            hit = picking.under_mouse_now(context, picking.pixel_of(event))
+            if hit is None or hit.kind is not picking.Kind.POINT:
+                return {"PASS_THROUGH"}
+            self.curve, self.index = hit.name, hit.index
+        return super().invoke(context, event)
+
+    def changed(self, opened: Opened) -> ControlPoints:
+        return edited_curve.with_toggled_corner(opened.points, self.checked_index(opened))
 
 
 class NICMM_OT_activate_curve(bpy.types.Operator):
@@ -170,6 +189,7 @@ CLASSES = (
     NICMM_OT_insert_point,
     NICMM_OT_move_point,
     NICMM_OT_remove_point,
+    NICMM_OT_toggle_corner,
     NICMM_OT_activate_curve,
     NICMM_OT_end_curve,
 )

@@ -9,7 +9,7 @@ from ..outputs import edited_curve
 from ..scene import mesh_data
 from . import modes
 from .draw_operator import NICMM_OT_draw_on_surface
-from .point_operators import NICMM_OT_end_curve
+from .point_operators import NICMM_OT_end_curve, NICMM_OT_toggle_corner
 
 ICON = "ops.curve.pen"
 LABEL = "Surface Curve"
@@ -21,19 +21,22 @@ KEYMAP = (
         {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
         {"properties": [("remove", True)]},
     ),
+    (NICMM_OT_toggle_corner.bl_idname, {"type": "J", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
 )
 """Mouse buttons and keys of the tool.
 
-Letters are left to Blender, and Alt to *Emulate 3 Button Mouse*.
+J has no use in these modes of Blender; the other letters are left to Blender, and Alt to *Emulate 3
+Button Mouse*.
 """
 
 HINTS = (
     (("MOUSE_LMB",), "Add or Insert Point"),
     (("MOUSE_LMB_DRAG",), "Move Point"),
     (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
+    (("EVENT_J",), "Toggle Corner"),
     (("EVENT_RETURN",), "End Curve"),
 )
 
@@ -60,7 +63,7 @@ class _SurfaceCurve:
             layout.operator(NICMM_OT_next_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
-        for name in ("closed", "smoothness"):
+        for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(properties, name)
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:

@@ -61,6 +61,7 @@ class CoarseStarts:
                 checkpoint()
                 places = copy.points_back(course.places)
                 nodes = noded(self._coarse_surface, places, course.control_nodes, request.closed)
+                nodes = nodes.with_corners(request.are_corners(course.visited))
                 controls = request.points[course.visited]
                 curve = nodes_on_fine_mesh(self._fine, self._coarse, nodes, controls)
                 yield None if curve is None else (curve, course.visited)

@@ -54,4 +54,5 @@ def nodes_on_fine_mesh(
         # Normals of the coarse mesh, since they ignore small dents that a trace has to cross.
         normals=coarse_curve.nodes.normals,
         neighbourhoods=cells_around,
+        corners=np.isin(coarse_curve.control_nodes, coarse_curve.corner_nodes),
     )

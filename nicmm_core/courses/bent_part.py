@@ -156,6 +156,7 @@ def request_for_part(request: Request, curve: DiscreteCurve, part: BentPart) -> 
         points=curve.nodes.places[part.passed],
         closed=False,
         order="given",
+        corners=np.flatnonzero(np.isin(part.passed, curve.corner_nodes)),
         via_points={},
         smoothness=request.smoothness * (curve.length / part.length) ** 2,
     )
@@ -196,4 +197,5 @@ def with_part(
         control_nodes,
         places[curve.control_nodes],
         curve.closed,
+        corners=np.isin(curve.control_nodes, curve.corner_nodes),
     )

@@ -108,6 +108,7 @@ def find_courses(
     points: SurfacePoints,
     along: FloatArray,
     fixed: BoolArray,
+    corners: BoolArray,
     closed: bool,
     smoothness: float,
     any_order: bool,
@@ -133,6 +134,8 @@ def find_courses(
         Distances along edges from these points to the V vertices and to the points themselves.
     fixed : (k,) bool array
         Which points are control points. Courses pass via points only until they are relaxed.
+    corners : (k,) bool array
+        Control points at which courses may turn freely.
     closed : bool
     smoothness : float
         Divisor of the tension.
@@ -152,7 +155,9 @@ def find_courses(
         waves = random_waves(along[:, : len(surface.mesh.vertices)], graph.spacing, seed)
         factor = np.exp(LENGTH_NOISE * waves) * (1.0 if factor is None else factor)
     tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
-    courses = with_control_points(graph, points, along, legs, factor, tension)
+    courses = with_control_points(
+        graph, points, corners, along, legs, factor, tension, surface.normal_bending
+    )
     checkpoint()
     found = candidates(courses, surface, closed, smoothness, any_order, search_size.candidates)
     if found is None:
@@ -160,6 +165,8 @@ def find_courses(
     nodes, point = found
     # Indices of control points do not count via points.
     number = np.append(np.where(fixed, np.cumsum(fixed) - 1, -1), -1)
+    corners = corners[fixed]
+    nodes = _with_corners(nodes, number[point], corners)
     nodes, visit, _ = remove_crossings(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
@@ -169,13 +176,16 @@ def find_courses(
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
     combined = recombined(surface, nodes, visit, simple, smoothness, search_size.recombined)
     if combined is not None:
-        new, new_visit, _ = remove_crossings(surface, *combined, any_order)
+        new, new_visit = combined
+        new = _with_corners(new, new_visit, corners)
+        new, new_visit, _ = remove_crossings(surface, new, new_visit, any_order)
         with subrange(0.6, 0.7):
             new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
         new, new_visit, new_simple = remove_crossings(surface, new, new_visit, any_order)
         places = joined([nodes.places, new.places])
         nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
+        nodes = _with_corners(nodes, visit, corners)
     best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search_size.finalists]
     nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
@@ -187,6 +197,11 @@ def find_courses(
         for _ in range(2):
             yield own, visited
             own, visited = _resampled(surface, own, visited, 2)
+
+
+def _with_corners(nodes: Nodes, visit: IntArray, corners: BoolArray) -> Nodes:
+    """The same courses, which may turn freely at some of the control points."""
+    return replace(nodes, corners=(visit >= 0) & corners[visit]) if corners.any() else nodes
 
 
 def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:

@@ -136,10 +136,13 @@ class CourseSurface:
                 self._mesh, request.points, request.via_points, request.order, request.closed
             )
             fixed = waypoints.is_control
+            corners = np.zeros(len(fixed), dtype=bool)
+            corners[np.flatnonzero(fixed)[request.corners]] = True
             on_refined = self._refined.in_parts(waypoints.points)
             along = distances_along_edges(self._surface.without_maps, on_refined)
         else:
             fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
+            corners = request.are_corners(visited)
             along = along[visited][:, np.append(np.arange(size), size + visited)]
         if edges_crossed(self._refined.mesh) > MOST_CROSSED:
             return
@@ -149,6 +152,7 @@ class CourseSurface:
             on_refined,
             along,
             fixed,
+            corners,
             request.closed,
             request.smoothness,
             any_order=request.order == "shortest" and not request.via_points,

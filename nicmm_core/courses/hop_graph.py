@@ -31,6 +31,7 @@ from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import dot
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
+from ..relaxation.elastic_energy import normal_bending_of_steps
 
 SEARCH_CELLS = 700
 """Number of cells per component. More cells would refine a course, which relaxation does better."""
@@ -164,16 +165,17 @@ class CourseGraph:
     graph : HopGraph
     points : SurfacePoints
         k control points.
+    corners : (k,) bool array
+        At which of them a course may turn freely.
     positions, normals : (n + k, 3) float array
         Positions and unit normals of the cells.
     hops : Hops
         The hops of all m + 2 d states.
     reverse : (m + 2 d,) int array
         Index of the reverse of each state.
-    weighted_length : (m + 2 d,) float array
-        Length of the hop of each state, times the factor there.
-    tension : float
-        τ, in 1/length².
+    weights : (m + 2 d,) float array
+        Cost of each state without its turns, in 1/length: τ times the length of its hop times the
+        factor there, and w ∫ κ_n² ds along the hop, with the weight w of the normal curvature.
     cost : (k, m + 2 d) float array
         Least cost of a path from each control point that ends with each state; infinite if there is
         no such path.
@@ -185,20 +187,15 @@ class CourseGraph:
 
     graph: HopGraph
     points: SurfacePoints
+    corners: BoolArray
     positions: FloatArray
     normals: FloatArray
     hops: Hops
     reverse: IntArray
-    weighted_length: FloatArray
-    tension: float
+    weights: FloatArray
     cost: FloatArray
     previous: IntArray
     first: IntArray
-
-    @cached_property
-    def weights(self) -> FloatArray:
-        """Costs of the states without bending, (m + 2 d,)."""
-        return self.tension * self.weighted_length
 
     @cached_property
     def for_kernels(self) -> nicmm_kernels.PathArrays:
@@ -216,10 +213,12 @@ class CourseGraph:
 def with_control_points(
     graph: HopGraph,
     points: SurfacePoints,
+    corners: BoolArray,
     along: FloatArray,
     legs: IntArray,
     factor: FloatArray | None,
     tension: float,
+    normal_bending: float,
 ) -> CourseGraph:
     """Add control points to a graph, and find the least costs from them.
 
@@ -228,6 +227,8 @@ def with_control_points(
     graph : HopGraph
     points : SurfacePoints
         k control points on the component of the graph.
+    corners : (k,) bool array
+        At which of them a course may turn freely.
     along : (k, V + k) float array
         Distances from the control points, by `distances_along_edges`.
     legs : (l, 2) int array
@@ -236,6 +237,8 @@ def with_control_points(
         Factor of lengths at the vertices; None for no factor.
     tension : float
         τ L², where L is the length of the shortest path through the points.
+    normal_bending : float
+        Weight of the normal curvature, squared.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
     length = along[:, len(surface.mesh.vertices) :][legs[:, 0], legs[:, 1]].sum()
@@ -260,9 +263,14 @@ def with_control_points(
     if factor is not None:
         at_cells = np.concatenate([factor[graph.vertex], _at_points(surface, points, factor)])
         weighted = weighted * 0.5 * (at_cells[hops.start] + at_cells[hops.end])
-    tension = tension / max(float(length), tolerances.TINY) ** 2
-    paths = _best_paths(graph, hops, departures, control, tension * weighted, k)
-    return CourseGraph(graph, points, positions, normals, hops, reverse, weighted, tension, *paths)
+    weights = tension / max(float(length), tolerances.TINY) ** 2 * weighted
+    if normal_bending:
+        start, end = hops.start, hops.end
+        weights = weights + normal_bending * normal_bending_of_steps(
+            normals[start], normals[end], positions[end] - positions[start], hops.length
+        )
+    paths = _best_paths(graph, hops, departures, control, weights, k)
+    return CourseGraph(graph, points, corners, positions, normals, hops, reverse, weights, *paths)
 
 
 def _best_paths(

@@ -197,6 +197,8 @@ def routes_of_legs(
 def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> FloatArray:
     """Bending at a control point, (a, b), where `a` states end and `b` states start."""
     hops = graph.hops
+    if graph.corners[hops.end[arriving[:1]] - len(graph.graph.vertex)].any():
+        return np.zeros((len(arriving), len(leaving)))
     cosine = hops.arriving[arriving] @ hops.leaving[leaving].T
     step = 0.5 * (hops.length[arriving][:, None] + hops.length[leaving])
     return np.arccos(cosine.clip(-1.0, 1.0)) ** 2 / np.maximum(step, tolerances.TINY)

@@ -97,7 +97,8 @@ def recombined(
     legs = [curves.of_leg(number) for number in range(curves.n_legs)]
     terms = comparable_terms(surface, nodes, smoothness, scale)
     cost = _costs(nodes, terms, course, begin, end, leg)
-    turns = _turning_costs(curves.nodes, legs, nodes.closed, scale)
+    corners = np.unique(visit[nodes.by_curve(nodes.corners)]) if nodes.corners is not None else []
+    turns = _turning_costs(curves.nodes, legs, np.isin(wanted, corners), nodes.closed, scale)
     found = cheapest_combinations(
         [cost[each] for each in legs], turns, crossing_legs(curves), nodes.closed
     )
@@ -221,9 +222,11 @@ def _costs(
 
 
 def _turning_costs(
-    legs: Nodes, of_legs: list[slice], closed: bool, scale: float
+    legs: Nodes, of_legs: list[slice], corners: BoolArray, closed: bool, scale: float
 ) -> list[FloatArray]:
     """Cost of joining two legs at a control point, for all pairs of curves of consecutive legs.
+
+    It is zero at corners, given for the control points in the order visited, (k,).
 
     Two legs with an angle θ between them share it: each end turns by θ / 2. Turning one end of a
     clamped elastic rod of length ℓ by an angle α takes the energy 4 α² / ℓ, so together they cost
@@ -237,8 +240,10 @@ def _turning_costs(
     inverse = 1.0 / np.maximum(length, tolerances.TINY)
     following = [*of_legs[1:], *of_legs[:1]] if closed else of_legs[1:]
     costs = []
-    for before, after in zip(of_legs, following, strict=False):
+    for before, after, is_corner in zip(of_legs, following, np.roll(corners, -1), strict=False):
         angle = np.arccos((arriving[before] @ leaving[after].T).clip(-1.0, 1.0))
+        if is_corner:
+            angle = np.zeros_like(angle)
         costs.append(scale * angle**2 * (inverse[before, None] + inverse[after]))
     return costs
 

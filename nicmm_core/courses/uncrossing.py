@@ -179,4 +179,6 @@ def _reversal(steps: IntArray, before: IntArray, closed: bool, any_order: bool) 
 
 def _in_order(surface: CurveSurface, nodes: Nodes, order: IntArray) -> Nodes:
     """The curves through their nodes in a given order, (c, n)."""
-    return nodes_at(surface, nodes.places[order.ravel()], nodes.closed, len(order))
+    among = order.ravel()
+    corners = None if nodes.corners is None else nodes.corners[among]
+    return nodes_at(surface, nodes.places[among], nodes.closed, len(order), corners)

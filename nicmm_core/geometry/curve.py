@@ -241,22 +241,42 @@ def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[Float
     return even, segment.astype(np.int64)
 
 
-def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArray:
-    """A face that contains each point and the next one, shape (n,)."""
-    faces, n = curve.faces, len(curve.faces)
-    following = (np.arange(n) + 1) % n
-    support = np.where(curve.barycentric > 0.0, mesh.faces[faces], -1)
+def shared_faces(mesh: Mesh, points: SurfacePoints) -> IntArray:
+    """A face that contains each point and the next one, the first after the last; -1 if none does.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        The n points.
+
+    Returns
+    -------
+    (n,) int array
+    """
+    faces, following = points.faces, np.roll(np.arange(len(points)), -1)
+    support = np.where(points.barycentric > 0.0, mesh.faces[faces], -1)
     found = faces.copy()
     unknown = ~_contains(mesh.faces[found], support[following])
     found[unknown] = faces[following][unknown]
     unknown &= ~_contains(mesh.faces[found], support)
-    unknown[-1] &= curve.closed
     for point in np.flatnonzero(unknown).tolist():
-        beyond = int(following[point])
-        both = np.concatenate([support[point], support[beyond]])
+        both = np.concatenate([support[point], support[following[point]]])
         common = mesh.faces_with(both[both >= 0])
-        if not len(common) and across_gaps:
-            common = _faces_near(mesh, curve, point, beyond)
+        found[point] = common[0] if len(common) else -1
+    return found
+
+
+def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArray:
+    """A face that contains each point and the next one, shape (n,)."""
+    n = len(curve.faces)
+    found = shared_faces(mesh, points_of(curve))
+    for point in np.flatnonzero(found < 0).tolist():
+        beyond = (point + 1) % n
+        if beyond == 0 and not curve.closed:
+            found[point] = curve.faces[point]
+            continue
+        common = _faces_near(mesh, curve, point, beyond) if across_gaps else found[:0]
         if not len(common):
             raise CurveError(
                 f"curve is not on this mesh: no face contains its points {point} and {beyond}; "

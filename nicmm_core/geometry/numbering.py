@@ -115,6 +115,10 @@ class Renumbered:
         """Map positions on the copy, (n, 3), to the original, up to the rounding of coordinates."""
         return self.frame.positions(positions)
 
+    def from_original(self, positions: FloatArray) -> FloatArray:
+        """Map positions in the space of the original, (n, 3), to that of the copy."""
+        return self.frame.coordinates(positions)
+
     def points_to(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the component to the copy, each in the first face that contains it."""
         return in_first_faces(self.mesh, self._in_copy(points))

@@ -92,7 +92,7 @@ def locate_control_points(
         If the points lie on different components of the mesh.
     """
     points = locate_points(mesh, control_points, "control_points")
-    _check_count(len(points), closed)
+    check_count(len(points), closed)
     check_distinct(mesh, points, control_point_names(np.arange(len(points))))
     if connected:
         check_connected(mesh, points)
@@ -315,13 +315,15 @@ def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:
         )
 
 
-def _check_count(count: int, closed: bool) -> None:
+def check_count(count: int, closed: bool, kind_of_points: str = "") -> None:
+    """Raise ControlPointError if a curve needs more points."""
     fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
     if count < fewest:
         kind = "a closed" if closed else "an open"
         number = f"{count} point" if count == 1 else f"{count} points"
         raise ControlPointError(
-            f"control_points has {number}, too few; {kind} curve needs at least {fewest}"
+            f"control_points has {number}{kind_of_points}, too few; {kind} curve needs at least "
+            f"{fewest}"
         )
 
 

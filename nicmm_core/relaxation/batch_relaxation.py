@@ -81,13 +81,14 @@ def relax_batch(
         faces.reshape(-1, size),
         barycentric.reshape(-1, size, 3),
         fixed.reshape(-1, size),
+        None if nodes.corners is None else nodes.by_curve(nodes.corners),
         nodes.closed,
         rules,
         batch,
         checkpoint,
     )
     places = SurfacePoints(faces.ravel(), barycentric.reshape(-1, 3))
-    return nodes_at(surface, places, nodes.closed, nodes.curves)
+    return nodes_at(surface, places, nodes.closed, nodes.curves, nodes.corners)
 
 
 def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
@@ -97,4 +98,5 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     return Nodes(
         nodes.places[place], nodes.closed, nodes.positions.take(place, axis=0),
         nodes.normals.take(place, axis=0), nodes.phi_fea.take(place), len(which),
+        None if nodes.corners is None else nodes.corners[place],
     )  # fmt: skip

@@ -42,6 +42,8 @@ class CurveSurface:
     folded : (F,) bool array or None
         Which faces are folded back over others, so that they point against the normals of their
         corners. None if no face is folded.
+    normal_bending : float
+        Weight of κ_n² in the bending energy, relative to κ_g².
     """
 
     mesh: Mesh
@@ -49,6 +51,7 @@ class CurveSurface:
     feature_map: FloatArray | None = None
     feature_weight: float = 0.0
     folded: BoolArray | None = None
+    normal_bending: float = 0.0
 
     @cached_property
     def for_kernels(self) -> nicmm_kernels.SurfaceArrays:
@@ -60,6 +63,7 @@ class CurveSurface:
             self.folded,
             None if feature_map is None else np.ascontiguousarray(feature_map),
             self.feature_weight,
+            self.normal_bending,
         )
 
 
@@ -99,6 +103,8 @@ class Nodes:
         φ_fea at the nodes.
     curves : int
         Number c of curves, each with n / c consecutive nodes.
+    corners : (n,) bool array or None
+        Control points at which the curve may turn freely; None without any.
     """
 
     places: SurfacePoints
@@ -107,6 +113,7 @@ class Nodes:
     normals: FloatArray
     phi_fea: FloatArray
     curves: int = 1
+    corners: BoolArray | None = None
 
     @cached_property
     def per_curve(self) -> int:
@@ -123,6 +130,7 @@ class Nodes:
             np.ascontiguousarray(self.phi_fea),
             self.closed,
             self.curves,
+            self.corners,
         )
 
     @property
@@ -142,7 +150,7 @@ class Nodes:
 
     @property
     def angles(self) -> FloatArray:
-        """Turning in the tangent planes, in radians, (n,); zero at the ends of open curves."""
+        """Turning in the tangent planes, in radians, (n,); zero at open ends and at corners."""
         return self.for_kernels.angles
 
     @cached_property
@@ -196,9 +204,15 @@ class Nodes:
         return result
 
 
-def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
+def nodes_at(
+    surface: CurveSurface,
+    places: SurfacePoints,
+    closed: bool,
+    curves: int = 1,
+    corners: BoolArray | None = None,
+) -> Nodes:
     """Create nodes at given places, with the normals and φ_fea that the energy needs."""
     positions, normals, phi_fea = nicmm_kernels.place_nodes(
         surface.for_kernels, *places.for_kernels
     )
-    return Nodes(places, closed, positions, normals, phi_fea, curves)
+    return Nodes(places, closed, positions, normals, phi_fea, curves, corners)

@@ -8,7 +8,7 @@ were. So the result is always a simple curve through the same control points in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import nicmm_kernels
 import numpy as np
@@ -76,17 +76,33 @@ class DiscreteCurve:
         return float(self.nodes.lengths.sum())
 
     @property
+    def corner_nodes(self) -> IntArray:
+        """Indices of the nodes at which the curve may turn freely."""
+        corners = self.nodes.corners
+        return np.zeros(0, dtype=np.int64) if corners is None else np.flatnonzero(corners)
+
+    @property
     def for_kernels(self) -> nicmm_kernels.CurveArrays:
         """The curve as compiled kernels read it."""
+        corners = self.nodes.corners
         is_control = np.zeros(len(self.node_index), dtype=bool)
         is_control[self.control_nodes] = True
         return nicmm_kernels.CurveArrays(
             self.closed,
             *self.nodes.places.for_kernels,
             is_control,
+            np.zeros(len(is_control), dtype=bool) if corners is None else corners,
             np.ascontiguousarray(self.node_index, np.int64),
             *self.polyline.for_kernels,
         )
+
+    def with_corners(self, corners: BoolArray) -> DiscreteCurve:
+        """The same curve, which may turn freely at some of the control points, (k,)."""
+        if not corners.any():
+            return replace(self, nodes=replace(self.nodes, corners=None))
+        at_nodes = np.zeros(len(self.node_index), dtype=bool)
+        at_nodes[self.control_nodes] = corners
+        return replace(self, nodes=replace(self.nodes, corners=at_nodes))
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
         """The polyline in the form of a result."""
@@ -100,6 +116,11 @@ def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
 
     The neighbours of a node strictly inside a face can be joined within this face.
     """
+    return without_points(mesh, curve, short_segments(mesh, curve))
+
+
+def short_segments(mesh: Mesh, curve: DiscreteCurve) -> BoolArray:
+    """Which points of the polyline are nodes at short segments; no two consecutive ones."""
     polyline = curve.polyline
     inside = np.zeros(len(polyline), dtype=bool)
     inside[np.delete(curve.node_index, curve.control_nodes)] = True
@@ -108,7 +129,13 @@ def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
     positions = polyline.positions(mesh)
     length = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     short = length < SHORT * float(curve.nodes.lengths.mean())
-    kept = ~(inside & (short | np.roll(short, 1)))
+    near_edges: BoolArray = inside & (short | np.roll(short, 1))
+    return near_edges
+
+
+def without_points(mesh: Mesh, curve: DiscreteCurve, left_out: BoolArray) -> SurfaceCurve:
+    """The polyline without some nodes, if it stays simple; otherwise the whole polyline."""
+    polyline, kept = curve.polyline, ~left_out
     if kept.all() or len(crossing_segments(mesh.faces, polyline[kept], curve.closed)):
         return curve.surface_curve(mesh)
     at_controls = (np.cumsum(kept) - 1)[curve.node_index[curve.control_nodes]]
@@ -116,7 +143,9 @@ def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
     return curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
-def place_nodes(surface: CurveSurface, curve: SurfaceCurve, count: int) -> DiscreteCurve:
+def place_nodes(
+    surface: CurveSurface, curve: SurfaceCurve, count: int, corners: BoolArray | None = None
+) -> DiscreteCurve:
     """Place nodes on a curve that passes through its control points in order.
 
     Parameters
@@ -125,6 +154,8 @@ def place_nodes(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Discr
     curve : SurfaceCurve
     count : int
         Approximate number of nodes.
+    corners : (k,) bool array, optional
+        Control points at which the curve may turn freely.
     """
     first = int(curve.control_index[0])
     faces, barycentric = np.roll(curve.faces, -first), np.roll(curve.barycentric, -first, axis=0)
@@ -133,6 +164,7 @@ def place_nodes(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Discr
         *SurfacePoints(faces, barycentric).for_kernels,
         curve.closed,
         (curve.control_index - first) % len(faces),
+        np.zeros(len(curve.control_index), dtype=bool) if corners is None else corners,
         count,
         placement_rules(surface),
     )
@@ -141,7 +173,9 @@ def place_nodes(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Discr
 
 def curve_from_kernels(surface: CurveSurface, given: nicmm_kernels.CurveArrays) -> DiscreteCurve:
     """A curve that a compiled kernel has found."""
-    nodes = nodes_at(surface, SurfacePoints(given.faces, given.barycentric), given.closed)
+    places = SurfacePoints(given.faces, given.barycentric)
+    corners = given.is_corner if given.is_corner.any() else None
+    nodes = nodes_at(surface, places, given.closed, corners=corners)
     polyline = SurfacePoints(given.polyline_faces, given.polyline_barycentric)
     return DiscreteCurve(nodes, np.flatnonzero(given.is_control), polyline, given.node_index)
 
@@ -188,7 +222,8 @@ def shifted(
     places, blocked, passed = trace_from(
         surface.mesh, nodes.places, direction, length, surface.folded
     )
-    return nodes_at(surface, places, nodes.closed, nodes.curves), blocked, passed
+    moved = nodes_at(surface, places, nodes.closed, nodes.curves, nodes.corners)
+    return moved, blocked, passed
 
 
 def is_simple(surface: CurveSurface, curve: DiscreteCurve) -> bool:

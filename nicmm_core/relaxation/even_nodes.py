@@ -67,7 +67,10 @@ def resampled(
     new = places_along(surface, nodes, traces, node[moves], share[moves])
     faces[moves], barycentric[moves] = new.faces, new.barycentric
     places = SurfacePoints(faces, barycentric)
-    return nodes_at(surface, places, nodes.closed, nodes.curves), former
+    corners = None
+    if nodes.corners is not None:
+        corners = (former >= 0) & nodes.corners[former]
+    return nodes_at(surface, places, nodes.closed, nodes.curves, corners), former
 
 
 def _even_places(

@@ -131,7 +131,7 @@ class Relaxed:
     discrete_curve : DiscreteCurve
         The same curve with its nodes.
     bending : float
-        ∮ κ_g² ds, in 1/length.
+        ∮ (κ_g² + w κ_n²) ds, in 1/length, with the weight w of the normal curvature.
     feature : float
         ∮ φ_fea² ds, in units of length.
     iterations : int
@@ -168,6 +168,7 @@ def relax(
     config: RelaxationConfig,
     watch: Watch | None = None,
     movable: Movable | None = None,
+    corners: BoolArray | None = None,
 ) -> Relaxed:
     """Relax a curve.
 
@@ -186,6 +187,8 @@ def relax(
         raises `CancelledError`.
     movable : callable, optional
         Which nodes may move; by default all but the control points.
+    corners : (k,) bool array, optional
+        Control points of a SurfaceCurve at which the curve may turn freely.
 
     Returns
     -------
@@ -194,7 +197,7 @@ def relax(
     """
     task = _Task(surface, smoothness, config, watch, movable)
     if isinstance(start, SurfaceCurve):
-        first = place_nodes(surface, start, config.levels[0])
+        first = place_nodes(surface, start, config.levels[0], corners)
         return _relaxed(task, config.levels, first, start)
     if len(config.levels) == 1 or scaled_bending(start) >= config.fine_below:
         return _relaxed(task, config.levels, start)
@@ -252,7 +255,8 @@ def _relaxed(
         curve = first
         result = first.surface_curve(task.surface.mesh) if start is None else start
         status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
-    bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
+    bending = bending_energy(curve.nodes, task.surface.normal_bending)
+    feature = feature_energy(curve.nodes)
     return Relaxed(result, curve, bending, feature, task.iterations, status, task.work, collided)
 
 

@@ -46,6 +46,7 @@ def simple_curve(
     closed: bool,
     normals: FloatArray | None = None,
     neighbourhoods: Neighbourhoods | None = None,
+    corners: BoolArray | None = None,
 ) -> DiscreteCurve | None:
     """Join nodes to a simple curve through control points.
 
@@ -63,6 +64,8 @@ def simple_curve(
         Normals at the nodes, which the planes of traces contain; by default those of the surface.
     neighbourhoods : Neighbourhoods, optional
         Where a path along edges is searched for; by default in rings of faces.
+    corners : (k,) bool array, optional
+        Control points at which the curve may turn freely.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def simple_curve(
             return None
         crossings = crossing_segments(surface.mesh.faces, curve.polyline, closed)
         if not len(crossings):
-            return curve
+            return curve if corners is None else curve.with_corners(corners)
         outside = _outside_loops(curve, crossings)
         if outside.all():
             return None

@@ -79,7 +79,8 @@ def with_moved_controls(
     still[going] = False
     places = SurfacePoints(faces, barycentric)
     # Between nodes that do not move the polyline is kept, since a straight trace may fail there.
-    changed = traced_through(surface, curve, nodes_at(surface, places, curve.closed), still)
+    moved_nodes = nodes_at(surface, places, curve.closed, corners=nodes.corners)
+    changed = traced_through(surface, curve, moved_nodes, still)
     if changed is None or not is_simple(surface, changed):
         return None
     return changed

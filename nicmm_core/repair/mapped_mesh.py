@@ -78,6 +78,10 @@ class MappedMesh:
         """Map positions on the mesh, (n, 3), to the given mesh."""
         return positions + self.origin
 
+    def from_original(self, positions: FloatArray) -> FloatArray:
+        """Map positions in the space of the given mesh, (n, 3), to that of the mesh."""
+        return positions - self.origin
+
     def representations(self, points: SurfacePoints) -> list[SurfacePoints]:
         """For each point of the given mesh, the same point in all faces of the mesh that hold it.
 

@@ -79,14 +79,18 @@ class BezierSpline:
 
 
 def fit_bezier(
-    points: FloatArray, closed: bool, control_index: IntArray, tolerance: float
+    points: FloatArray,
+    closed: bool,
+    control_index: IntArray,
+    tolerance: float,
+    corners: IntArray | None = None,
 ) -> BezierSpline:
     """Fit a Bézier spline to a polyline, with as few knots as keep it within a tolerance.
 
     Control points, corners and the ends of an open polyline are knots. A knot and its two handles
-    lie on one line, except at corners, where the polyline turns by more than 30° within a few
-    tolerances. The distance is measured at many places, from the polyline to the spline and from
-    the spline to the polyline.
+    lie on one line, except at corners: where the polyline turns by more than 30° within a few
+    tolerances, and at the given corners, however little it turns there. The distance is measured at
+    many places, from the polyline to the spline and from the spline to the polyline.
 
     Splitting stops at the vertices of the polyline. A cubic over a single segment keeps any
     tolerance, but only with short handles, so the spline bends as sharply there as the polyline.
@@ -100,16 +104,19 @@ def fit_bezier(
         Indices of the control points among the points, in any order; -1 is ignored.
     tolerance : float
         Greatest distance between the spline and the polyline, in units of the points.
+    corners : (c,) int array, optional
+        Indices among the points of corners, besides those that are found.
     """
     control_index = np.asarray(control_index, dtype=np.int64)
-    given = cut_polyline(points, closed, control_index)
+    corners = np.zeros(0, dtype=np.int64) if corners is None else corners
+    given = cut_polyline(points, closed, np.append(control_index, corners))
     line, kept = _without_repeats(given)
     if len(line.points) < 2:
         place = points[:1]
         index = np.where(control_index >= 0, 0, -1)
         return BezierSpline(closed, place.copy(), place.copy(), place.copy(), index)
 
-    fitter = _Fitter(line, MEASURED * tolerance)
+    fitter = _Fitter(line, MEASURED * tolerance, kept[np.isin(given.vertex, corners)])
     knots = _split(fitter)
     knots, tangents, handles = _merge(fitter, knots)
 
@@ -203,26 +210,29 @@ class _Spans:
 class _Fitter:
     """A polyline with the data that fits require, and the fits of cubics to its spans."""
 
-    def __init__(self, line: CutPolyline, tolerance: float) -> None:
+    def __init__(self, line: CutPolyline, tolerance: float, corners: IntArray) -> None:
         self.line = line
         self.tolerance = tolerance
         self.turn = line.turns(line.arc, CORNER_REACH * tolerance)
-        self.sharp = self._corners()
+        self.sharp = self._corners(corners)
         self.fixed = np.union1d(line.bounds, np.flatnonzero(self.sharp))
         self.sharp[[0, -1]] |= not line.closed
         if line.closed and len(self.fixed) == 2:  # one cubic would end where it starts
             halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
             self.fixed = np.union1d(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
 
-    def _corners(self) -> BoolArray:
-        """Which vertices are corners, (n,): one vertex at each place of a sharp turn."""
+    def _corners(self, given: IntArray) -> BoolArray:
+        """Which vertices are corners, (n,): the given ones, and one at each other sharp turn."""
         reach, arc = CORNER_REACH * self.tolerance, self.line.arc
         found = np.zeros(len(arc), dtype=bool)
-        at = np.flatnonzero(self.turn > CORNER)
+        # The turn of a given corner is also measured at the vertices near it.
+        taken = (np.abs(arc[:, None] - arc[given]) <= reach).any(axis=1)
+        at = np.flatnonzero((self.turn > CORNER) & ~taken)
         # The same turn is measured at vertices close together; it counts where it is greatest.
         for group in np.split(at, np.flatnonzero(np.diff(arc[at]) > reach) + 1):
             if len(group):
                 found[group[self.turn[group].argmax()]] = True
+        found[given] = True
         if self.line.closed:
             found[[0, -1]] = found[0] | found[-1]
         return found

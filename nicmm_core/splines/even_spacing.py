@@ -7,7 +7,7 @@ between anchors are divided evenly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -47,6 +47,9 @@ ANCHOR_ROUNDS = 4
 CLOSE_COUNT = 1.05
 """Ratio of two numbers of segments up to which the search does not distinguish them."""
 
+ROOM = 2.0
+"""Least length of a segment for a point beside a corner, relative to the distance of the point."""
+
 
 @dataclass(frozen=True)
 class SampledCurve:
@@ -76,7 +79,13 @@ class SampledCurve:
     control_index: IntArray
 
 
-def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurve:
+def even_curve(
+    mesh: Mesh,
+    curve: SurfaceCurve,
+    tolerance: float,
+    corners: IntArray | None = None,
+    beside: float = 0.0,
+) -> SampledCurve:
     """Evenly spaced points of a curve; see `even_places`.
 
     Parameters
@@ -85,6 +94,8 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     curve : SurfaceCurve
     tolerance : float
         Greatest distance between the two curves, in mesh units.
+    corners, beside
+        As in `even_places`, in mesh units.
 
     Raises
     ------
@@ -92,7 +103,9 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
         If the curve does not lie on this mesh.
     """
     curve, segment_faces = checked_curve(mesh, curve, across_gaps=True)
-    places = even_places(curve.points, curve.closed, curve.control_index, tolerance)
+    places = even_places(
+        curve.points, curve.closed, curve.control_index, tolerance, corners, beside
+    )
     segment, share, control_index = places
     between = share > 0.0
     following = np.where(between, (segment + 1) % len(curve.faces), segment)
@@ -107,7 +120,12 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
 
 
 def even_places(
-    points: FloatArray, closed: bool, control_index: IntArray, tolerance: float
+    points: FloatArray,
+    closed: bool,
+    control_index: IntArray,
+    tolerance: float,
+    corners: IntArray | None = None,
+    beside: float = 0.0,
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Find evenly spaced places on a polyline, as few as keep it within a tolerance.
 
@@ -126,6 +144,9 @@ def even_places(
     point, the closest of the divisions that were tried is taken, and its distance exceeds the
     tolerance.
 
+    A tube along the polyline is thinner at a corner, up to the next point. So at given corners, two
+    further points can be placed beside the corner, before and after it.
+
     Parameters
     ----------
     points : (n, 3) float array
@@ -135,6 +156,11 @@ def even_places(
         Indices of the control points among the points, in any order; -1 is ignored.
     tolerance : float
         Greatest distance between the two polylines, in units of the points.
+    corners : (c,) int array, optional
+        Indices among the points of control points that get points beside them.
+    beside : float, default 0
+        Distance of these points from the corner along the polyline, in units of the points. There
+        are none if it is 0, or where a segment is too short for them.
 
     Returns
     -------
@@ -156,6 +182,12 @@ def even_places(
         for leg in legs
     ]
     _limit_ratios(legs, divisions, closed, tolerance)
+    if corners is not None and beside > 0.0:
+        sharp = np.isin(line.vertex[line.bounds], corners)
+        divisions = [
+            _with_points_beside(division, start, end, beside, tolerance)
+            for division, start, end in zip(divisions, sharp[:-1], sharp[1:], strict=True)
+        ]
 
     places = [division.places for division in divisions]
     segment, share = (np.concatenate(of_legs) for of_legs in zip(*places, strict=True))
@@ -323,6 +355,21 @@ def _without_short_segments(division: _Division, spacing: float) -> _Division | 
         piece = np.searchsorted(leg.arc[ends], division.at[:-1][short], side="right") - 1
         kept = np.setdiff1d(ends, ends[[piece, piece + 1]])
         division = _spread(leg, np.union1d(kept, leg.bounds), spacing)
+
+
+def _with_points_beside(
+    division: _Division, start: bool, end: bool, beside: float, tolerance: float
+) -> _Division:
+    """A division with points near its start and end, if these are corners."""
+    at, length = division.at, division.leg.length
+    room = ROOM + 1.0 if division.count == 1 and start and end else ROOM
+    added = []
+    if start and at[1] - at[0] > room * beside:
+        added.append(beside)
+    if end and at[-1] - at[-2] > room * beside:
+        added.append(length - beside)
+    found = replace(division, at=np.union1d(at, added))
+    return found if found.deviation <= max(division.deviation, tolerance) else division
 
 
 def _limit_ratios(

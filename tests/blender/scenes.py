@@ -7,10 +7,20 @@ import numpy as np
 
 import bmesh
 
+NORMAL_BENDING = 0.3
+"""Blender's default."""
+
 
 def installed_core():
     """The core of the installed extension."""
     return import_module("bl_ext.user_default.nicmm_curves.nicmm_core")
+
+
+def design(core, mesh, points, **arguments):
+    """A curve of the core with the extension's defaults, where they differ from the core's."""
+    if arguments.get("method", "elastic") == "elastic":
+        arguments = {"normal_bending": NORMAL_BENDING, **arguments}
+    return core.design_curve(mesh, points, **arguments)
 
 
 def module(extension, name):

@@ -45,6 +45,7 @@ DAMAGES = (
     lambda record: record.__setitem__("corners", [-5] * len(record["corners"])),
     lambda record: record.__setitem__("control_corners", [-1] * len(record["control_corners"])),
     lambda record: record.__setitem__("control_index", [10**6] * len(record["control_index"])),
+    lambda record: record.__setitem__("corner_points", [2] * len(record["control_corners"])),
     lambda record: record.__setitem__("counts", [7]),
     lambda record: record.__setitem__("counts", "many"),
     lambda record: record.__setitem__("version", 99),
@@ -177,6 +178,10 @@ class Abuse(RuleBasedStateMachine):
     def remove_point(self, index):
         self.call(bpy.ops.nicmm.remove_point, index=index)
 
+    @rule(index=st.integers(0, 6))
+    def toggle_corner(self, index):
+        self.call(bpy.ops.nicmm.toggle_corner, index=index)
+
     @rule()
     def end_curve(self):
         self.call(bpy.ops.nicmm.end_curve)
@@ -194,6 +199,7 @@ class Abuse(RuleBasedStateMachine):
                 ("closed", False),
                 ("closed", True),
                 ("smoothness", 3.0),
+                ("normal_bending", 1.0),
                 ("spline", "BEZIER"),
                 ("spline", "EVEN"),
                 ("offset", 0.1),
@@ -224,6 +230,10 @@ class Abuse(RuleBasedStateMachine):
     @rule()
     def edit_curve(self):
         self.call(bpy.ops.nicmm.edit_curve)
+
+    @rule()
+    def set_corners(self):
+        self.call(bpy.ops.nicmm.edit_curve, corners="0, 2")
 
     @rule(first=NUMBERS)
     def design_curve(self, first):

@@ -43,7 +43,7 @@ def drawn(path):
 def test_group_points_and_places_give_the_same(command, file, tmp_path, extension):
     path, vertices, mesh = file
     before = path.read_bytes()
-    expected = extension.core.design_curve(mesh, vertices).curves[0].points
+    expected = scenes.design(extension.core, mesh, vertices).curves[0].points
     places = [" ".join(map(str, mesh.vertices[v])) for v in vertices]
     for number, points in enumerate(
         (

@@ -34,7 +34,7 @@ def refusal(**arguments):
 
 def expected_curve(core, mesh_object, positions, **arguments):
     from_mesh = core.Mesh(scenes.positions(mesh_object), scenes.triangles(mesh_object))
-    return core.design_curve(from_mesh, np.array(positions), **arguments).curves[0]
+    return scenes.design(core, from_mesh, np.array(positions), **arguments).curves[0]
 
 
 @pytest.fixture

@@ -142,7 +142,7 @@ def test_methods_keep_the_numbers_that_files_store(extension):
 def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
-    of_scripts = {"points", "point_group"}
+    of_scripts = {"points", "point_group", "corners"}
     assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
 
 
@@ -184,7 +184,7 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
     editing = bpy.ops.nicmm.edit_curve.get_rna_type().properties
     recorded = {}
     for option in table.OPTIONS:
-        if option.kind in (table.Kind.POINTS, table.Kind.CURVES):
+        if option.kind in table.COMPOUND_KINDS:
             continue
         name = record.property_name(option)
         assert designing[name].name == option.label
@@ -194,7 +194,9 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
             recorded[name] = designing[name].default
     found = asdict(record.CurveSettings())
     assert list(found) == [*recorded, "use_modifiers"]  # the digest depends on the order
-    assert found == {**recorded, "use_modifiers": True}
+    assert recorded["normal_bending"] == scenes.NORMAL_BENDING
+    # Records from before there was this setting keep the curve as it is.
+    assert found == {**recorded, "normal_bending": 0.0, "use_modifiers": True}
     added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
     whole = table.Option("turns", table.Kind.COUNT, 1, "Turns", "Winds", limits=(0.0, 9.0))
     made = settings.properties_of((*table.OPTIONS, added, whole))

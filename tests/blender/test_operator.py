@@ -17,7 +17,7 @@ ROUNDING = 1e-6
 
 def design(core, mesh_object, vertices, scale=(1.0, 1.0, 1.0), **arguments):
     mesh = core.Mesh(scenes.positions(mesh_object) * scale, scenes.triangles(mesh_object))
-    return core.design_curve(mesh, vertices, **arguments)
+    return scenes.design(core, mesh, vertices, **arguments)
 
 
 def reported_error(**arguments):

@@ -232,7 +232,7 @@ def inside_faces(monkey):
     nicmm = scenes.installed_core()
 
     mesh = nicmm.Mesh(scenes.positions(monkey), triangles(monkey))
-    curve = nicmm.design_curve(mesh, [73, 365, 74, 366]).curves[0]
+    curve = scenes.design(nicmm, mesh, [73, 365, 74, 366]).curves[0]
     region = nicmm.enclosed_region(mesh, nicmm.cut_mesh(mesh, curve))
     polygon = [t.polygon_index for t in monkey.data.loop_triangles]
     within = np.bincount(polygon, mesh.face_areas * region.share)
@@ -264,7 +264,7 @@ def test_region_that_is_cut_ends_at_the_curve(monkey, mode):
     bpy.ops.mesh.primitive_monkey_add()
     other = bpy.context.active_object
     mesh = nicmm.Mesh(scenes.positions(other), triangles(other))
-    curve = nicmm.design_curve(mesh, [73, 365, 74, 366]).curves[0]
+    curve = scenes.design(nicmm, mesh, [73, 365, 74, 366]).curves[0]
     assert inside == pytest.approx(
         nicmm.enclosed_region(mesh, nicmm.cut_mesh(mesh, curve)).area, rel=0.02
     )

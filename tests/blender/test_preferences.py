@@ -24,6 +24,7 @@ OPERATORS = (
     "insert_point",
     "move_point",
     "remove_point",
+    "toggle_corner",
     "activate_curve",
     "end_curve",
     "draw_on_surface",

@@ -322,7 +322,7 @@ def test_transforms(empty_scene, matrix, output):
     vertices = scenes.ring(sphere, 4, height=0.4)
     scenes.select(sphere, vertices)
     place = scenes.positions(sphere) @ np.array(sphere.matrix_world.to_3x3()).T
-    expected = core.design_curve(core.Mesh(place, scenes.triangles(sphere)), vertices)
+    expected = scenes.design(core, core.Mesh(place, scenes.triangles(sphere)), vertices)
     assert bpy.ops.nicmm.design_curve(spline="EXACT", output=output) == {"FINISHED"}
     if output == "EDGES":
         assert not sphere.data.validate()

@@ -37,8 +37,10 @@ def test_documented_script(empty_scene, all_attempts, tmp_path):
     bpy.ops.mesh.primitive_monkey_add()
     monkey = bpy.data.objects[mesh_name]
     vertices = [int(index) for index in indices.split(",")]
-    expected = empty_scene.core.design_curve(
-        empty_scene.core.Mesh(scenes.positions(monkey), scenes.triangles(monkey)), vertices
+    expected = scenes.design(
+        empty_scene.core,
+        empty_scene.core.Mesh(scenes.positions(monkey), scenes.triangles(monkey)),
+        vertices,
     )
     source, output = tmp_path / "head.blend", tmp_path / "out.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source))

@@ -163,6 +163,19 @@ def scaled(mesh, factor):
     return nicmm.Mesh(factor * mesh.vertices, mesh.faces)
 
 
+def cylinder(around=24, along=12, radius=1.0):
+    """Open prism about the z axis, from z = 0 to z = 2."""
+    angle, height = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around, np.linspace(0.0, 2.0, along + 1), indexing="ij"
+    )
+    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+    index = np.arange(angle.size).reshape(angle.shape)
+    onward = np.roll(index, -1, axis=0)
+    a, b, c, d = index[:, :-1], onward[:, :-1], onward[:, 1:], index[:, 1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return nicmm.Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+
+
 def grid(count):
     """Unit square of ``count`` by ``count`` squares, each divided along its diagonal."""
     x, y = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")

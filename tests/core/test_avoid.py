@@ -205,6 +205,10 @@ class TestArguments:
         with pytest.raises(nicmm.ArgumentError, match='avoid needs the method "elastic"'):
             nicmm.design_curve(plate, [3, 50, 90], avoid=[line], method="variational")
 
+    def test_with_a_mirror(self, plate, line):
+        with pytest.raises(nicmm.ArgumentError, match="avoid and mirror cannot be combined"):
+            nicmm.design_curve(plate, [3, 50, 90], avoid=[line], mirror=((0, 0, 0), (1, 0, 0)))
+
     def test_clearance_alone(self, plate):
         with pytest.raises(nicmm.ArgumentError, match="without obstacles or avoid"):
             nicmm.design_curve(plate, [3, 50, 90], clearance=0.1)

@@ -92,6 +92,8 @@ def test_formats_go_by_their_endings(small_ball, tmp_path, mesh_ending, ending):
         ("--smoothness 0.2", {"smoothness": 0.2}),
         ("--method variational", {"method": "variational"}),
         ("--open", {"closed": False}),
+        ("--corners 0,2", {"corners": [0, 2]}),
+        ("--normal-bending 0.5", {"normal_bending": 0.5}),
     ],
 )
 def test_options_reach_the_design(mesh_file, tmp_path, one_attempt, flags, options):

@@ -89,6 +89,7 @@ def arguments_relax(c=4):
         "faces": faces,
         "barycentric": barycentric,
         "fixed": fixed,
+        "corners": fixed.copy(),
         "closed": True,
         "rules": rules(),
         "batch": nicmm_kernels.BatchRules(9, 3, 2, 1e-3),
@@ -115,7 +116,7 @@ def surface_arrays():
     """The ball with a map."""
     vertices = BALL.vertices.copy()
     feature_map = 1.0 + 0.5 * np.sin(9.0 * vertices[:, 0])
-    return nicmm_kernels.SurfaceArrays(BALL.for_kernels, vertices, None, feature_map, 5.0)
+    return nicmm_kernels.SurfaceArrays(BALL.for_kernels, vertices, None, feature_map, 5.0, 0.5)
 
 
 def arguments_place():
@@ -135,6 +136,7 @@ def arguments_nodes():
         "normals": normals,
         "phi_fea": phi_fea,
         "closed": True,
+        "corners": np.arange(60) % 20 == 0,
     }
 
 
@@ -168,6 +170,7 @@ def arguments_placing():
         "barycentric": curve.barycentric,
         "closed": True,
         "controls": curve.control_index,
+        "corners": np.array([False, True, False]),
         "count": 40,
         "rules": PLACEMENT,
     }
@@ -458,6 +461,7 @@ OF_ANY_LENGTH = [
     ("distinct_routes", "via"),
     ("least_sums", "other"),
     ("place_on_polyline", "controls"),
+    ("place_on_polyline", "corners"),
 ]
 """Arrays whose last axis has a length that no other array has."""
 
@@ -493,7 +497,7 @@ def with_mesh(given, mesh):
     if "surface" not in given:
         return {**given, "mesh": mesh}
     normals = BALL.vertices.copy()
-    return {**given, "surface": nicmm_kernels.SurfaceArrays(mesh, normals, None, None, 0.0)}
+    return {**given, "surface": nicmm_kernels.SurfaceArrays(mesh, normals, None, None, 0.0, 0.0)}
 
 
 def arrays_in(given):
@@ -625,11 +629,13 @@ def test_mesh_arrays_that_do_not_fit_are_refused(place, change):
 def test_other_arrays_that_do_not_fit_are_refused():
     normals, none = BALL.vertices.copy(), None
     with pytest.raises(KernelError, match="vertex_normals has shape"):
-        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals[1:], none, none, 0.0)
+        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals[1:], none, none, 0.0, 0.0)
     with pytest.raises(KernelError, match="feature_map has type int64"):
-        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, none, np.arange(len(normals)), 0.0)
+        nicmm_kernels.SurfaceArrays(
+            BALL.for_kernels, normals, none, np.arange(len(normals)), 0.0, 0.0
+        )
     with pytest.raises(KernelError, match="folded has shape"):
-        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, np.ones(3, bool), none, 0.0)
+        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, np.ones(3, bool), none, 0.0, 0.0)
 
 
 def test_kernels_of_one_curve_refuse_several():

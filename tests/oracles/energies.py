@@ -17,9 +17,8 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.maps.guidance import surface_unit
+from nicmm_core.mapped_surface import MappedSurface
 from nicmm_core.relaxation.curve_energies import energies_of
-from nicmm_core.relaxation.curve_nodes import curve_surface, with_maps
 
 from . import same_surface
 from .defects import defective_meshes
@@ -65,13 +64,11 @@ class NamedRequest:
     options: dict[str, Any] = field(default_factory=dict)
 
     def energy(self) -> float:
-        """Elastic energy of the curve with its maps; L ∮ κ_g² ds + 4π² without maps."""
+        """Elastic energy of the curve with its maps; L ∮ κ_g² ds + 4π² by default."""
         design = nicmm.design_curve(self.mesh, self.points, **self.options)
         assert design.resumable is not None
         mesh, request = design.resumable.mesh, design.resumable.request
-        surface = with_maps(
-            curve_surface(mesh), request.obstacles, request.alignment, surface_unit(mesh, 0)
-        )
+        surface = MappedSurface(mesh).of(request)
         return energies_of(surface, [design.resumable.curve], request.smoothness)[0]
 
 
@@ -80,6 +77,7 @@ def named_requests() -> Iterator[NamedRequest]:
     yield from _on_creatures()
     yield from _on_simple_shapes()
     yield from _with_maps()
+    yield from _with_other_bending()
     yield from _on_defects()
 
 
@@ -122,6 +120,15 @@ def _with_maps() -> Iterator[NamedRequest]:
         for option in ("obstacles", "alignment"):
             options = {"order": "shortest", option: weights}
             yield NamedRequest(f"creature {20 + seed}, {option}", mesh, points, options)
+
+
+def _with_other_bending() -> Iterator[NamedRequest]:
+    for seed in range(30, 33):
+        mesh = shapes.creature(seed, resolution=40, faces=400)
+        points = _points(mesh, 4, seed)
+        for name, value in {"corners": [0, 2], "normal_bending": 0.5}.items():
+            options = {"order": "shortest", name: value}
+            yield NamedRequest(f"creature {seed}, {name}", mesh, points, options)
 
 
 def _on_defects() -> Iterator[NamedRequest]:

@@ -20,16 +20,27 @@ class Weights(NamedTuple):
     contact: float = 0.0
     feature: float = 0.0
     frozen_ds: FloatArray | None = None
+    normal_bending: float = 0.0
 
 
 def energy(nodes: Nodes, weights: Weights | nicmm_kernels.Linearised) -> float:
-    """∮ κ_g² ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds, with ds held in lanes, and contact."""
+    """∮ (κ_g² + w κ_n²) ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds, and contact; ds held in lanes."""
     excess, ds = nodes.phi_fea**2 - 1.0, nodes.ds
     total = nodes.angles**2 / ds + (weights.tension + weights.feature * excess.clip(0.0)) * ds
     if weights.frozen_ds is not None:
         total += weights.feature * excess.clip(None, 0.0) * weights.frozen_ds
+    total[nodes.with_step] += weights.normal_bending * normal_bending(nodes)
     overlap = 1.0 - contacts(nodes)[1] / (CLEARANCE * nodes.lengths.mean())
     return float(total.sum() + 2.0 * weights.contact * (overlap**2).sum())
+
+
+def normal_bending(nodes: Nodes) -> FloatArray:
+    """κ_n² ds along each step, from the change of the normal in the direction of the step."""
+    following = nodes.following[nodes.with_step]
+    tangents = nodes.steps[nodes.with_step] / nodes.lengths[:, None]
+    change = nodes.normals[following] - nodes.normals[nodes.with_step]
+    result: FloatArray = ((change * tangents).sum(axis=1) / nodes.lengths) ** 2 * nodes.lengths
+    return result
 
 
 def contacts(nodes: Nodes) -> tuple[IntArray, FloatArray]:

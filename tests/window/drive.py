@@ -27,6 +27,9 @@ INSIDE = Path(__file__).resolve().with_name("inside.py")
 PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
 DRAGGED, JUMPING = 3, 1
 
+SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))
+"""Sideways and backwards on the crown of Suzanne's head; with three corners, a shield."""
+
 SMOOTHNESS = (150, 68)
 """Pixel of the field in the header."""
 
@@ -404,6 +407,56 @@ def live_between(blender: Blender) -> None:
     blender.wait(f"helper.state() == {before!r}", "undo after these steps")
 
 
+def corners(blender: Blender) -> None:
+    """A key over a point makes it a corner; elsewhere nothing happens."""
+    step("J over a point makes it a corner, and again makes the curve smooth there")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look(0.15, 0.75, 1.0)")
+    choose_tool(blender)
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    states = click_places(blender, blender.do(f"value = helper.from_above({SHIELD})"))[-1:]
+    blender.shot("18-no-corners")
+    for number, wanted in ((4, [4]), (2, [2, 4]), (0, [0, 2, 4])):
+        toggle_corner(blender, number, wanted)
+        states.append(state(blender))
+    beside = blender.do("value = helper.pixels([-1.2, 0, 1.2])")[0]
+    blender.move(beside)
+    blender.shot("18-corners")
+    undo_and_redo(blender, states, "of corners")
+    toggle_corner(blender, 2, [0, 4])
+
+    step("J beside a point and beside the mesh changes nothing")
+    before = state(blender)
+    for pixel in (blender.do("value = helper.pixels(helper.from_above([(0, 0.3)]))")[0], beside):
+        blender.move(pixel)
+        time.sleep(0.5)
+        blender.key("j")
+        time.sleep(1.0)
+        check(state(blender) == before, "nothing changes")
+
+    step("A corner stays one while it is dragged")
+    drag(blender, pixel_of(blender, 4), 20, (1.5, 1.0), "18-corner-dragged")
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {before!r}", "the dragged curve")
+    blender.wait("helper.corners() == [0, 4]", "the same corners")
+
+    step("Normal Bending in the header and in the sidebar")
+    before = state(blender)
+    blender.do("helper.show_sidebar()")
+    blender.do("helper.curve().nicmm_settings.normal_bending = 1.0")
+    blender.wait(f"helper.state() != {before!r}", "another curve")
+    blender.shot("19-normal-bending")
+    blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
+def toggle_corner(blender: Blender, number: int, wanted: list) -> None:
+    """Press the key over a point, and wait for the corners that the curve then has."""
+    blender.move(pixel_of(blender, number))
+    time.sleep(0.5)
+    blender.key("j")
+    blender.wait(f"helper.corners() == {wanted}", f"corners {wanted}")
+
+
 def picking(blender: Blender) -> None:
     """Clicks act on what is visible: hidden parts, X-ray, other curves, other objects."""
     step("From the side: hidden parts are dimmed")
@@ -555,12 +608,15 @@ def other_modes(blender: Blender) -> None:
         blender.mouse("mouseup", 1)
         blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
         time.sleep(0.6)
+        dragged = state(blender)
+        toggle_corner(blender, 2, [2])
+        undo_and_redo(blender, [dragged, state(blender)], f"of a corner in {mode}")
         blender.do("helper.switch('Suzanne', 'OBJECT')")
 
 
 def keys(blender: Blender) -> None:
     """The keymap editor, the Industry Compatible keymap, and Emulate 3 Button Mouse."""
-    step("The tool's keys are in the keymap editor, without letters")
+    step("The tool's keys are in the keymap editor, with one letter")
     found = blender.do(
         "maps = bpy.context.window_manager.keyconfigs.user.keymaps\n"
         "value = [[each.name, [[item.idname, item.type, item.value] for item in each.keymap_items]]"
@@ -568,8 +624,9 @@ def keys(blender: Blender) -> None:
     )
     check(len(found) == 3, "a keymap for each mode")
     for name, items in found:
-        check(len(items) == 5, f"five items in {name}")
-        check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
+        check(len(items) == 6, f"six items in {name}")
+        letters = [kind for _, kind, _ in items if len(kind) == 1]
+        check(letters == ["J"], f"one letter in {name}")
     for config in ("Industry_Compatible", "Blender"):
         step(f"The keymap {config}")
         blender.do(f"helper.keymap({config!r})")
@@ -766,6 +823,7 @@ PARTS = {
     "live": live_between,
     "picking": picking,
     "ridge": ridge,
+    "corners": corners,
     "bodies": other_bodies,
     "modes": other_modes,
     "methods": methods,

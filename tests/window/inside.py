@@ -94,6 +94,13 @@ class Helper:
         return [list(location) for _hit, location, _normal, _face in found]
 
     @staticmethod
+    def from_above(pairs):
+        """Points of Suzanne that are visible from above, at x and y."""
+        monkey = bpy.data.objects["Suzanne"]
+        found = [monkey.ray_cast((x, y, 5.0), (0.0, 0.0, -1.0)) for x, y in pairs]
+        return [list(location) for _hit, location, _normal, _face in found]
+
+    @staticmethod
     def figure():
         """Suzanne with a subdivision, and an armature that an action bends until frame 20."""
         for found in list(bpy.data.objects):
@@ -146,6 +153,14 @@ class Helper:
             edited.free()
             monkey.modifiers.new("Mirror", "MIRROR")
         monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+
+    @classmethod
+    def show_sidebar(cls):
+        """Show the tab of the extension in the sidebar."""
+        cls.area().spaces.active.show_region_ui = True
+        sidebar = next(region for region in cls.area().regions if region.type == "UI")
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # the tabs exist when drawn
+        sidebar.active_panel_category = "NICMM"
 
     @staticmethod
     def activate():
@@ -286,6 +301,11 @@ class Helper:
     def places(cls):
         """Control points of the active curve in the mesh's local space."""
         return np.array(cls.curve()["nicmm_curve"]["control_positions"]).reshape(-1, 3).tolist()
+
+    @classmethod
+    def corners(cls):
+        """Indices of the corners of the active curve."""
+        return np.flatnonzero(cls.curve()["nicmm_curve"]["corner_points"]).tolist()
 
     @classmethod
     def line(cls):

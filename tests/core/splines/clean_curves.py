@@ -9,6 +9,9 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from tests.core.checks import random_surface_points
 
+SQUARE = np.array([[-0.5, -0.5, 0.0], [0.5, -0.5, 0.0], [0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]])
+"""Corners of a square."""
+
 DESIGNS = ("ball", "ring", "cube", "open")
 
 
@@ -24,6 +27,13 @@ def designed(name):
     points = random_surface_points(mesh, count, seed=3)
     design = nicmm.design_curve(mesh, points, closed=name != "open")
     return mesh, design.curves[0]
+
+
+@cache
+def designed_square():
+    """A curve designed in the plane through four corners."""
+    design = nicmm.design_curve(shapes.disc(16), SQUARE, corners=[0, 1, 2, 3])
+    return design.curves[0]
 
 
 def irregular(count, seed):

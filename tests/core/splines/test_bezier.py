@@ -9,7 +9,16 @@ from nicmm_core.geometry.tolerances import CLEAN_CURVE
 from nicmm_core.splines.bezier import fit_bezier
 from nicmm_core.splines.polyline import angles
 from tests.core.checks import circle
-from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
+from tests.core.splines.clean_curves import (
+    DESIGNS,
+    SQUARE,
+    designed,
+    designed_square,
+    irregular,
+    square,
+    strays,
+    subdivided,
+)
 
 NONE = np.zeros(0, dtype=np.int64)
 SAMPLES = 3000
@@ -113,6 +122,50 @@ def test_a_weak_corner_is_rounded():
     spline = assert_fits(points, False, NONE, 1e-4)
     np.testing.assert_allclose(turns(spline), 0.0, atol=1e-6)
     assert len(spline.knots) <= 5
+
+
+def test_a_given_corner_has_free_handles():
+    """However weak it is, both sides stay exactly straight."""
+    slope = np.tan(np.radians(10.0))
+    x = np.linspace(-1.0, 1.0, 41)
+    points = np.stack([x, slope * np.maximum(x, 0.0), 0.0 * x], axis=1)
+    spline = fit_bezier(points, False, NONE, 1e-4, corners=np.array([20]))
+    np.testing.assert_array_equal(spline.knots, points[[0, 20, 40]])
+    assert turns(spline) == pytest.approx([np.radians(10.0)], abs=1e-9)
+    assert strays(sampled(spline), points, False) < 1e-12
+
+
+@pytest.mark.parametrize("first", [0, 300])
+def test_corners_of_a_smooth_curve(first):
+    """The arcs on both sides of a given corner are fitted apart, each to its own side."""
+    at = np.linspace(0.0, np.pi, 301)
+    arc = np.stack([np.cos(at), np.sin(at), 0.0 * at], axis=1)
+    crescent = np.concatenate([arc[:-1], arc[:-1] * [-1.0, 0.15, 1.0]])
+    points, corners = np.roll(crescent, -first, axis=0), (np.array([0, 300]) - first) % 600
+    spline = fit_bezier(points, True, corners, 1e-3, corners)
+    sharp = np.isin(np.arange(len(spline.knots)), spline.control_index)
+    assert sharp.sum() == 2
+    np.testing.assert_allclose(turns(spline)[~sharp], 0.0, atol=1e-6)
+    assert (turns(spline)[sharp] > np.radians(60.0)).all()
+    assert strays(sampled(spline), points, True) < 1.01e-3
+
+
+def test_a_corner_need_not_be_a_control_point():
+    points = circle(np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False))
+    spline = fit_bezier(points, True, np.array([50, -1]), 1e-3, corners=np.array([210]))
+    np.testing.assert_array_equal(spline.knots[spline.control_index[0]], points[50])
+    assert spline.control_index[1] == -1
+    assert (spline.knots == points[210]).all(axis=1).any()
+    assert strays(sampled(spline), points, True) < 1.01e-3
+
+
+def test_a_square_designed_with_corners():
+    """Four knots, and all handles on the sides."""
+    curve = designed_square()
+    spline = fit_bezier(curve.points, True, curve.control_index, 1e-4, curve.control_index)
+    np.testing.assert_allclose(spline.knots, SQUARE, atol=1e-12)
+    np.testing.assert_allclose(np.abs(sampled(spline)[:, :2]).max(axis=1), 0.5, atol=2e-4)
+    np.testing.assert_allclose(turns(spline), 0.5 * np.pi, atol=1e-2)
 
 
 def test_zigzag_within_the_tolerance_does_not_show():

@@ -10,7 +10,16 @@ from nicmm_core import shapes
 from nicmm_core.geometry.tolerances import CLEAN_CURVE, of_clean_curve
 from nicmm_core.splines.even_spacing import even_curve, even_places
 from tests.core.checks import circle
-from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
+from tests.core.splines.clean_curves import (
+    DESIGNS,
+    SQUARE,
+    designed,
+    designed_square,
+    irregular,
+    square,
+    strays,
+    subdivided,
+)
 
 NONE = np.zeros(0, dtype=np.int64)
 ROUNDED = 1.0 + 1e-9
@@ -84,6 +93,41 @@ def test_corners_are_points():
         places, _ = assert_even(points, True, NONE, 1e-4)
         assert len(places) == 4
         assert strays(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), places, True) == 0.0
+
+
+def test_a_square_designed_with_corners():
+    """Its corners are points, and no point between them leaves the sides."""
+    curve = designed_square()
+    places, index = assert_even(curve.points, True, curve.control_index, 1e-4)
+    np.testing.assert_allclose(places[index], SQUARE, atol=1e-12)
+    np.testing.assert_allclose(np.abs(places[:, :2]).max(axis=1), 0.5, atol=2e-4)
+    assert len(places) <= 12
+
+
+def test_points_beside_corners():
+    """A point on either side of each corner, at the given distance, where there is room."""
+    points, corners = np.roll(square(100), -100, axis=0), np.array([0, 200, 400, 600])
+    segment, share, index = even_places(points, True, corners, 1e-4, corners[:3], beside=0.07)
+    places = positions(points, segment, share)
+    unit = np.array([[1.0, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]])
+    np.testing.assert_allclose(places[index], unit, atol=1e-12)
+    for number, corner in enumerate(unit):
+        for other in (unit[number - 1], unit[(number + 1) % 4]):
+            beside = corner + 0.07 * (other - corner)
+            there = np.linalg.norm(places - beside, axis=1).min() < 1e-12
+            assert there == (number < 3)
+    none = even_places(points, True, corners, 1e-4, corners, beside=0.4)
+    assert len(none[0]) == 4  # there is no room for them
+
+
+def test_points_beside_corners_keep_the_tolerance():
+    at = irregular(2000, seed=1) * 20.0
+    points = np.stack([np.cos(at), np.sin(at), 0.2 * at], axis=1)
+    controls = np.array([0, 700, 1500, 1999])
+    segment, share, _ = even_places(points, False, controls, 1e-3, controls[1:3], beside=0.01)
+    places = positions(points, segment, share)
+    assert len(places) == len(even_places(points, False, controls, 1e-3)[0]) + 4
+    assert strays(points, places, False) <= 1e-3 * ROUNDED
 
 
 def test_corners_between_control_points_need_few_points():
