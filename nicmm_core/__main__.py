@@ -13,7 +13,7 @@ from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
 from .geometry.mirror import parse_plane
-from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
+from .io.files import check_curve_path, read_curve, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .options import Kind, Option
 from .path.via_points import parse_via_points
@@ -122,6 +122,13 @@ def _flag(option: Option) -> dict[str, Any]:
             "help": "vertices near which the curve runs after the I-th of the points, from 0; "
             "repeatable",
         }
+    if option.kind is Kind.CURVES:
+        return {
+            "action": "append",
+            "default": [],
+            "metavar": "CURVE.json",
+            "help": f"{words}; written with -o CURVE.json; repeatable",
+        }
     if option.kind is Kind.INDICES:
         return {"metavar": "I,J", "help": f"{words}, by their places in --points, from 0"}
     if option.kind is Kind.PLANE:
@@ -139,6 +146,8 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
     value = getattr(given, option.name)
     if option.kind is Kind.POINTS:
         return parse_via_points(value) or None
+    if option.kind is Kind.CURVES:
+        return [read_curve(path) for path in value] or None
     if option.kind is Kind.INDICES:
         what = "indices of control points"
         return None if value is None else _indices(option.name, value, what, "0,2")

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import options
-from .errors import ArgumentError
+from .errors import ArgumentError, CurveError
+from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
+from .geometry.curve import SurfaceCurve, checked_curve, points_of
 from .geometry.mesh import Mesh, real_array
 from .geometry.mirror import checked_plane
 from .options import Kind, Option
@@ -31,22 +33,26 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        The checked values by name, with weights as (V,) float arrays. Via points and indices are
-        returned unchecked; `path.via_points` and `checked_corners` check them.
+        The checked values by name, with weights as (V,) float arrays and curves as a tuple. Via
+        points and indices are returned unchecked; `path.via_points` and `checked_corners` check
+        them.
 
     Raises
     ------
     ArgumentError
         If a value is invalid, or if an option is set without the option or the method that it
         needs.
+    CurveError
+        If a curve does not lie on the mesh.
     """
     checked = {each.name: _checked(mesh, each, given[each.name]) for each in options.OPTIONS}
     for each in options.OPTIONS:
         value = checked[each.name]
-        if each.needs and value != each.default and checked[each.needs] is None:
+        missing = each.needs and all(checked[name] is None for name in each.needs)
+        if missing and value != each.default:
             raise ArgumentError(
-                f"{each.name} has no effect without {each.needs}; pass both, or leave {each.name} "
-                "out"
+                f"{each.name} has no effect without {' or '.join(each.needs)}; pass both, or "
+                f"leave {each.name} out"
             )
         if each.elastic_only and value != each.default and checked["method"] != "elastic":
             raise ArgumentError(
@@ -69,9 +75,48 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
         return number_between(name, value, *option.limits, what)
     if option.kind is Kind.COUNT:
         return _checked_count(option, value)
+    if option.kind is Kind.CURVES:
+        return _checked_curves(mesh, name, value)
     if option.kind is Kind.PLANE:
         return None if value is None else checked_plane(name, value, mesh)
     return value
+
+
+def _checked_curves(mesh: Mesh, name: str, value: Any) -> tuple[SurfaceCurve, ...] | None:
+    """Check that a list has only curves on the mesh.
+
+    None and an empty list give None.
+    """
+    if value is None:
+        return None
+    if not isinstance(value, list | tuple):
+        raise ArgumentError(
+            f"{name} is a {type(value).__name__}; pass a list of SurfaceCurve or Design, or None"
+        )
+    found = []
+    for number, given in enumerate(value):
+        if not isinstance(given, SurfaceCurve):
+            raise ArgumentError(
+                f"{name}[{number}] is {given!r}; pass a SurfaceCurve, or a Design with exactly "
+                "one curve"
+            )
+        found.append(_checked_curve(mesh, f"{name}[{number}]", given))
+    return tuple(found) or None
+
+
+def _checked_curve(mesh: Mesh, name: str, given: SurfaceCurve) -> SurfaceCurve:
+    try:
+        curve, _ = checked_curve(mesh, given, across_gaps=True)
+    except CurveError as error:
+        raise CurveError(f"{name} cannot be used: {error}") from error
+    away = np.abs(points_of(curve).positions(mesh) - curve.points).max()
+    if not away <= tolerances.SAME_CURVE * mesh.diagonal:
+        raise CurveError(
+            f"{name} lies on another mesh: its points differ by up to {away:g} from the positions "
+            "that their faces and barycentric coordinates give on this mesh; pass the mesh that it "
+            "was designed on"
+        )
+    return curve
 
 
 def checked_number(name: str, value: Any, what: str = "a finite number") -> float:

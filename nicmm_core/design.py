@@ -21,7 +21,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_iterations, checked_corners, checked_options
 from .blas_threads import single_blas_thread
-from .design_result import Design, cancelled_design
+from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
@@ -51,9 +51,11 @@ from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
+from .repair.off_curves import Avoided, avoided_curves, check_not_crossed
 from .repaired_surface import (
     Manifold,
     RepairedSurface,
+    SurfaceOffCurves,
     curve_of_design,
     is_on,
     only_curve,
@@ -106,6 +108,7 @@ class Designer:
             )
         self.mesh = mesh
         self._free: _Free | None = None  # of the last request with obstacles
+        self._off_curves: SurfaceOffCurves | None = None  # of the last one with curves to avoid
         self._reflected: ReflectedVertices | None = None  # of the last one with maps and a mirror
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
@@ -121,6 +124,7 @@ class Designer:
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
+        avoid: Sequence[SurfaceCurve | Design] | None = None,
         smoothness: float = 1.0,
         corners: ArrayLike | None = None,
         normal_bending: float = 0.0,
@@ -152,8 +156,8 @@ class Designer:
         Raises
         ------
         CurveError
-            If the start lies on another mesh, enters an obstacle, is too far from the control
-            points, or would cross itself when moved to them.
+            If the start lies on another mesh, enters an obstacle, meets a curve of `avoid`, is too
+            far from the control points, or would cross itself when moved to them.
         """
         started = time.perf_counter()
         given = {
@@ -166,6 +170,7 @@ class Designer:
             "normal_bending": normal_bending,
             "obstacles": obstacles,
             "clearance": clearance,
+            "avoid": with_curves_of_designs(avoid),
             "alignment": alignment,
             "mirror": mirror,
             "alternatives": alternatives,
@@ -183,7 +188,11 @@ class Designer:
                 begin = None if start is None else start_on(manifold, start)
                 with placed(manifold.in_original):
                     found = manifold.designer.design(there, started, begin, max_iterations)
-                    return manifold.design_on_original(found, request)
+                    design = manifold.design_on_original(found, request)
+                    if request.avoid is not None:
+                        avoided = avoided_curves(self.mesh, request.avoid, request.points)
+                        design = _check_not_crossed(self.mesh, design, avoided)
+                    return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -246,6 +255,8 @@ class Designer:
             options["via_points"] = located_via_points(mesh, points, via, order, closed)
             options["corners"] = checked_corners(options["corners"], len(points))
             return Request(points=points, **options)
+        if options["avoid"] is not None:
+            raise ArgumentError("avoid and mirror cannot be combined; leave one out")
         given = locate_points(mesh, control_points, "control_points")
         if not len(given):
             check_count(0, closed)
@@ -281,9 +292,12 @@ class Designer:
     def _on_manifold(self, request: Request) -> tuple[Manifold, Request]:
         """The first manifold that connects the points, and the request on it."""
         surface = self._surface_off_obstacles(request)
-        found = surface.find(request)
+        kept_off = None if request.avoid is None else self._surface_off_curves(surface, request)
+        found = surface.find(request) if kept_off is None else kept_off.find(request)
         if found is not None:
             return found
+        if kept_off is not None:
+            kept_off.check_reachable(request)
         check_connected(self.mesh, request.points)
         if request.via_points:
             with_via_points(
@@ -306,6 +320,35 @@ class Designer:
             surface = self._whole if every else RepairedSurface(self._whole.surfaces, free)
             last = self._free = _Free(obstacles, clearance, surface)
         return last.surface
+
+    def _surface_off_curves(self, surface: RepairedSurface, request: Request) -> SurfaceOffCurves:
+        """The surface off the curves to avoid; it is kept until a request has other curves.
+
+        Control points matter only where they lie on the curves.
+        """
+        assert request.avoid is not None
+        avoided = avoided_curves(self.mesh, request.avoid, request.points)
+        last = self._off_curves
+        if last is None or not last.is_of(surface, avoided, request.clearance):
+            last = self._off_curves = SurfaceOffCurves(surface, avoided, request.clearance)
+        return last
+
+
+def _check_not_crossed(mesh: Mesh, design: Design, avoided: list[Avoided]) -> Design:
+    """A design without alternatives that cross avoided curves.
+
+    Raises
+    ------
+    UnreachableError
+        If the curve of the design itself crosses one of them.
+    """
+    for curve in design.curves:
+        check_not_crossed(mesh, curve, avoided)
+    kept = []
+    for other in design.alternatives:
+        with contextlib.suppress(UnreachableError):
+            kept.append(_check_not_crossed(mesh, other, avoided))
+    return replace(design, alternatives=kept)
 
 
 def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
@@ -347,6 +390,7 @@ def design_curve(
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
+    avoid: Sequence[SurfaceCurve | Design] | None = None,
     smoothness: float = 1.0,
     corners: ArrayLike | None = None,
     normal_bending: float = 0.0,
@@ -381,7 +425,13 @@ def design_curve(
         Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
         a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.
     clearance : float, default 0
-        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
+        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1
+        and from the curves of `avoid`.
+    avoid : list of SurfaceCurve or Design, optional
+        Curves on the mesh that the curve does not cross, and from which it keeps the clearance.
+        Control points on them are junctions, at which the curve ends or passes through; the
+        clearance does not count along an avoided curve up to twice the clearance from a junction.
+        Only with the method "elastic".
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
     corners : (c,) int array_like, optional
@@ -400,7 +450,8 @@ def design_curve(
         the reflected points, and the `control_index` of the curve has them as well. A map counts on
         both sides: each vertex has the greater of its own weight and that of its mirror image. The
         mirror image of the leg from the i-th point has the images of ``via_points[i]``. With
-        "shortest", the order is that of a short path of the half. Only for the method "elastic".
+        "shortest", the order is that of a short path of the half. Not with `avoid`. Only for the
+        method "elastic".
     alternatives : int, default 0
         Largest number of further curves, along other courses, to return in `Design.alternatives`.
         Only with the method "elastic".
@@ -416,10 +467,13 @@ def design_curve(
     Raises
     ------
     ControlPointError
-        If there are too few points, or one is repeated, out of range or off the surface.
+        If there are too few points, or one is repeated, out of range or off the surface, or closer
+        to a curve of `avoid` than the clearance without lying on it.
     UnreachableError
         If no simple curve through the points exists on the surface, if every path found winds
-        around itself too often, or if obstacles of weight 1 separate the points.
+        around itself too often, or if obstacles of weight 1 or curves to avoid separate the points.
+    CurveError
+        If a curve of `avoid` does not lie on the mesh.
     ArgumentError
         If another argument cannot be used, or the mesh is not symmetric enough about the mirror.
 
@@ -441,6 +495,7 @@ def design_curve(
         obstacles=obstacles,
         alignment=alignment,
         clearance=clearance,
+        avoid=avoid,
         smoothness=smoothness,
         corners=corners,
         normal_bending=normal_bending,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
+from typing import Any
 
 from .errors import CurveError
 from .geometry.array_types import FloatArray
@@ -88,6 +89,16 @@ class Design:
             If the design was cancelled before there was a curve.
         """
         return self.find_field()
+
+
+def with_curves_of_designs(given: Any) -> Any:
+    """Replace designs in a list by their curves, if they have one each; leave the rest."""
+    if not isinstance(given, list | tuple):
+        return given
+    return [
+        each.curves[0] if isinstance(each, Design) and len(each.curves) == 1 else each
+        for each in given
+    ]
 
 
 def cancelled_design(seconds: float) -> Design:

@@ -25,11 +25,12 @@ class Kind(Enum):
     LENGTH = "a length in mesh units"
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
+    CURVES = "a list of curves on the mesh, or None"
     INDICES = "indices of control points, or None"
     PLANE = "a point of a plane and its normal, or None"
 
 
-COMPOUND_KINDS = (Kind.POINTS, Kind.INDICES, Kind.PLANE)
+COMPOUND_KINDS = (Kind.POINTS, Kind.CURVES, Kind.INDICES, Kind.PLANE)
 """Kinds of values that have several parts, and so no single field in a user interface."""
 
 
@@ -62,8 +63,8 @@ class Option:
         Smallest and largest value of a number, a count or a length, both included.
     usual : (float, float)
         Range of a slider, inside the limits.
-    needs : str
-        Name of the option without which this one has no effect, or "".
+    needs : tuple of str
+        Names of options without which this one has no effect; one of them is enough.
     elastic_only : bool
         Whether only the method "elastic" accepts another value than the default.
     flag : str
@@ -78,7 +79,7 @@ class Option:
     choices: tuple[Choice, ...] = ()
     limits: tuple[float, float] = (0.0, float("inf"))
     usual: tuple[float, float] = (0.0, float("inf"))
-    needs: str = ""
+    needs: tuple[str, ...] = ()
     elastic_only: bool = False
     flag: str = ""
 
@@ -176,8 +177,16 @@ OPTIONS: tuple[Option, ...] = (
         Kind.LENGTH,
         0.0,
         "Clearance",
-        "Minimum distance along the surface between the curve and obstacles of weight 1",
-        needs="obstacles",
+        "Minimum distance along the surface from obstacles of weight 1 and from curves to avoid",
+        needs=("obstacles", "avoid"),
+    ),
+    Option(
+        "avoid",
+        Kind.CURVES,
+        None,
+        "Avoid",
+        "Curves on the mesh that the curve does not cross, except at control points on them",
+        elastic_only=True,
     ),
     Option(
         "alignment",

@@ -32,6 +32,7 @@ from .path.via_points import with_via_points
 from .repair.clean_surface import CleanSurface
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
+from .repair.off_curves import Avoided, check_off_curves, surface_off_curves
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
@@ -58,8 +59,8 @@ class Manifold:
         A manifold made from the faces of the given mesh, with the component of the request.
     copies : tuple
         The copies from the given mesh to the mesh of the designer, each made from the one before:
-        the repaired mesh, unless it is the given mesh itself, and the canonical copy of a
-        component, unless the mesh is large and connected.
+        the repaired mesh, unless it is the given mesh itself, the part of it off curves that are
+        avoided, and the canonical copy of a component, unless the mesh is large and connected.
     designer : SurfaceDesigner
         Designer on the last of these meshes.
     """
@@ -110,6 +111,11 @@ class Manifold:
                 raise CurveError(
                     "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at "
                     f"a non-manifold edge{WITHOUT_START}"
+                )
+            if mapped is None and isinstance(copy, MappedMesh):
+                raise CurveError(
+                    "start crosses a curve of avoid, or comes closer to one than the clearance"
+                    f"{WITHOUT_START}"
                 )
             if mapped is None:
                 raise CurveError(
@@ -217,24 +223,100 @@ class RepairedSurface:
             if component is None:
                 continue
             found = self._on_component(mapped, component)
-            there = found.request(request)
-            if coincide(found.mesh, there.points):  # on the two sides of a gap that was closed
-                continue
-            if there.via_points:
-                with_via_points(
-                    found.mesh, there.points, there.via_points, there.order, there.closed
-                )
-            return found, there
+            there = _request_on(found, request)
+            if there is not None:
+                return found, there
         return None
 
 
-def _on_component(mapped: MappedMesh, component: int) -> Manifold:
-    """A component of a manifold with its canonical copy and a designer."""
+class SurfaceOffCurves:
+    """The manifolds of a surface, without what is too close to curves that are avoided.
+
+    Parameters
+    ----------
+    surface : RepairedSurface
+    avoided : list of Avoided
+    clearance : float
+    """
+
+    def __init__(self, surface: RepairedSurface, avoided: list[Avoided], clearance: float) -> None:
+        self.surface, self.avoided, self.clearance = surface, avoided, clearance
+        self._off_curves = cache(lambda mapped: surface_off_curves(mapped, avoided, clearance))
+        self._on_component = cache(_on_component)
+
+    def is_of(self, surface: RepairedSurface, avoided: list[Avoided], clearance: float) -> bool:
+        """Whether it was made from these arguments."""
+        return (
+            self.surface is surface
+            and self.clearance == clearance
+            and len(self.avoided) == len(avoided)
+            and all(map(Avoided.equals, self.avoided, avoided))
+        )
+
+    def find(self, request: Request) -> tuple[Manifold, Request] | None:
+        """Find a manifold on which the points of a request are connected, as `RepairedSurface`."""
+        points = joined([request.points, *request.via_points.values()])
+        for mapped in self.surface.manifolds():
+            component = mapped.common_component(points)
+            off = None if component is None else self._off_curves(mapped)
+            if component is None or off is None:
+                continue
+            whole = replace(mapped, component=component)
+            part = off.common_component(whole.points_to(points) if whole.differs else points)
+            if part is None:
+                continue
+            found = self._on_component(mapped, component, off, part)
+            there = _request_on(found, request)
+            if there is not None:
+                return found, there
+        return None
+
+    def check_reachable(self, request: Request) -> None:
+        """Raise an error if points of a request lie too close to the curves, or are separated.
+
+        Raises
+        ------
+        ControlPointError
+        UnreachableError
+        """
+        points = joined([request.points, *request.via_points.values()])
+        for mapped in self.surface.manifolds():
+            component = mapped.common_component(points)
+            if component is None:
+                continue
+            whole, off = replace(mapped, component=component), self._off_curves(mapped)
+            named = request.named_points
+            if whole.differs:
+                named = {name: whole.points_to(of_name) for name, of_name in named.items()}
+            check_off_curves(off, named, self.clearance)
+
+
+def _request_on(found: Manifold, request: Request) -> Request | None:
+    """A request on a manifold; None if points coincide there, on two sides of a gap."""
+    there = found.request(request)
+    if coincide(found.mesh, there.points):
+        return None
+    if there.via_points:
+        with_via_points(found.mesh, there.points, there.via_points, there.order, there.closed)
+    return there
+
+
+def _on_component(
+    mapped: MappedMesh, component: int, off_curves: MappedMesh | None = None, part: int = 0
+) -> Manifold:
+    """A component of a manifold with its canonical copy and a designer.
+
+    With `off_curves`, it is a component of this part of the manifold.
+    """
     mapped = replace(mapped, component=component)
     copies: Copies = (mapped,) if mapped.differs else ()
-    mesh = mapped.mesh
+    mesh, last, component = mapped.mesh, mapped, mapped.component
+    if off_curves is not None:
+        last, component = replace(off_curves, component=part), part
+        copies = (*copies, last) if last.differs else copies
+        mesh = last.mesh
     if len(mesh.faces) <= LARGEST_COPY or (mesh.face_component != component).any():
-        copy = renumbered(mesh, component, exact=mapped.moved)
+        copy = renumbered(mesh, component, exact=last.moved or mapped.moved)
         copies, mesh = (*copies, copy), copy.mesh
     return Manifold(mapped, copies, SurfaceDesigner(mesh))
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .geometry.array_types import BoolArray, FloatArray, IntArray
+from .geometry.curve import SurfaceCurve
 from .geometry.mirror import Mirror
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
@@ -34,7 +35,9 @@ class Request:
         Weight of the normal curvature, squared, in the bending energy.
     obstacles : (V,) float array or None
     clearance : float
-        Least distance from obstacles of weight 1, in mesh units.
+        Least distance from obstacles of weight 1 and from curves to avoid, in mesh units.
+    avoid : tuple of SurfaceCurve or None
+        Curves on the given mesh that the curve does not cross; they are not mapped.
     alignment : (V,) float array or None
     mirror : Mirror or None
         The plane of a symmetric curve.
@@ -52,6 +55,7 @@ class Request:
     normal_bending: float
     obstacles: FloatArray | None
     clearance: float
+    avoid: tuple[SurfaceCurve, ...] | None
     alignment: FloatArray | None
     mirror: Mirror | None
     alternatives: int
@@ -106,6 +110,8 @@ def _same(one: Any, other: Any) -> bool:
         return all(
             _same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one)
         )
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, dict):

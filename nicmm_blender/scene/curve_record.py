@@ -134,7 +134,8 @@ def arguments_of(
         values[option.name] = value
     for option in RECORDED:
         is_of_no_use = option.elastic_only and settings.method != "ELASTIC"
-        if is_of_no_use or (option.needs and values[option.needs] is None):
+        lacks = option.needs and all(values.get(name) is None for name in option.needs)
+        if is_of_no_use or lacks:
             values[option.name] = option.default
     return values
 

@@ -1,4 +1,4 @@
-"""Reads meshes from files, and writes meshes and curves, in the format of the file extension."""
+"""Reads and writes meshes and curves, in the format of the file extension."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ArgumentError, MeshError, NicmmError
 from ..geometry.curve import SurfaceCurve
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, real_array, whole_numbers
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
@@ -57,6 +57,31 @@ def read_mesh(path: str | Path) -> Mesh:
         return Mesh(polygons.vertices, triangles)
     except MeshError as error:
         raise MeshError(f"{path} contains no usable mesh: {error}") from error
+
+
+def read_curve(path: str | Path) -> SurfaceCurve:
+    """Read a curve from a JSON file that `write_curve` has written.
+
+    Whether it lies on a mesh is checked where it is used.
+
+    Raises
+    ------
+    ArgumentError
+        If the file cannot be opened or contains no curve.
+    """
+    path = _supported(path, (".json",), ArgumentError, "of a curve file")
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        closed = data["closed"]
+        faces, control_index = (whole_numbers(data[name]) for name in ("faces", "control_index"))
+        barycentric, points = (real_array(data[name]) for name in ("barycentric", "points"))
+    except OSError as error:
+        raise ArgumentError(f"{path} cannot be opened ({error}); check the path") from error
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise ArgumentError(
+            f"{path} contains no curve ({error!r}); write the curve as JSON again"
+        ) from error
+    return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:

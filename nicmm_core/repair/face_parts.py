@@ -170,6 +170,44 @@ class FaceParts:
         weights = (first[rows] + np.array(shares)[:, None] * change[rows]).clip(0.0)
         return SurfacePoints(part[rows], without_small_weights(weights)), which[rows]
 
+    def clipped(
+        self, faces: IntArray, start: FloatArray, end: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+        """The pieces of segments of the given faces in every triangle of their face.
+
+        Parameters
+        ----------
+        faces : (s,) int array
+            The given face of each segment.
+        start, end : (s, 3) float array
+            Barycentric coordinates of its ends.
+
+        Returns
+        -------
+        (p,) int array
+            Index of the segment of each piece, ascending.
+        (p,) int array
+            The triangle that contains it.
+        (p, 3) float array
+            Barycentric coordinates of its start in the triangle.
+        (p, 3) float array
+            Those of its end.
+        """
+        which, part, inverse = self._inverses(faces)
+        first, last = (np.einsum("nd,ndc->nc", weights[which], inverse) for weights in (start, end))
+        change = last - first
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zero = -first / change
+        outside = (np.abs(change) <= tolerances.ROUNDED) & (first < -tolerances.ROUNDED)
+        enters = np.where(change > tolerances.ROUNDED, zero, 0.0).max(axis=1).clip(0.0)
+        leaves = np.where(change < -tolerances.ROUNDED, zero, 1.0).min(axis=1).clip(max=1.0)
+        inside = (enters <= leaves + tolerances.ROUNDED) & ~outside.any(axis=1)
+        ends = (
+            without_small_weights((first + share[:, None] * change)[inside].clip(0.0))
+            for share in (enters, leaves)
+        )
+        return which[inside], part[inside], *ends
+
     def _inverses(self, faces: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
         """The triangles of some given faces: index of the face, triangle, inverse of its corners.
 

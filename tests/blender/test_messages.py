@@ -18,6 +18,7 @@ CORE = (
     "repaired_surface.py",
     "start.py",
     "repair/free_surface.py",
+    "repair/off_curves.py",
     "outputs/cut.py",
     "outputs/region.py",
     "path/legs.py",

@@ -27,7 +27,7 @@ ADDED = (
         "What the ends do",
         choices=(Choice("free", "Free", ""), Choice("at-rim", "At the Rim", "")),
     ),
-    Option("margin", Kind.LENGTH, 0.0, "Margin", "Distance from stairs", needs="stairs"),
+    Option("margin", Kind.LENGTH, 0.0, "Margin", "Distance from stairs", needs=("stairs",)),
     Option("stairs", Kind.WEIGHTS, None, "Stairs", "Where it is steep"),
     Option("wavy", Kind.SWITCH, False, "Wavy", "Make waves"),
     Option("turns", Kind.COUNT, 1, "Turns", "How often it winds", limits=(0, 9)),

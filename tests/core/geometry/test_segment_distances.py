@@ -1,0 +1,96 @@
+"""Tests distances along the surface from segments."""
+
+import igl
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.geometry.distances import distance_to_segments
+from nicmm_core.geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
+from tests.core.checks import random_surface_points
+
+
+def inside_faces(mesh, count, seed):
+    """Random segments, each between two points inside one face."""
+    one, other = (random_surface_points(mesh, count, seed).barycentric for seed in (seed, seed + 1))
+    return FaceSegments(random_surface_points(mesh, count, seed).faces, one, other)
+
+
+def at_vertices(mesh, vertices):
+    """Segments of length zero at vertices."""
+    corner = mesh.faces[:, :, None] == np.array(vertices)
+    faces = corner.any(axis=1).argmax(axis=0)
+    weights = corner[faces, :, np.arange(len(vertices))].astype(float)
+    return FaceSegments(faces, weights, weights)
+
+
+def test_distances_in_a_plane_are_those_of_the_plane(flat_disc):
+    segments = inside_faces(flat_disc, 5, seed=2)
+    points = random_surface_points(flat_disc, 200, seed=5)
+    found = SegmentDistances(flat_disc, segments, 0.5).at(points)
+    start, end = segments.positions(flat_disc)
+    places = points.positions(flat_disc)
+    expected = np.min(
+        [
+            distance_to_segments(places, *np.broadcast_arrays(a, b, places)[:2])
+            for a, b in zip(start, end, strict=True)
+        ],
+        axis=0,
+    )
+    near = expected < 0.5
+    assert 50 < near.sum() < 200
+    np.testing.assert_allclose(found[near], expected[near], rtol=1e-12, atol=1e-14)
+    assert (found[~near] >= 0.5).all()
+
+
+@pytest.mark.parametrize("limit", [0.2, 1.0])
+def test_distances_from_vertices_are_exact_geodesics(surface, limit):
+    sources = np.random.default_rng(3).choice(len(surface.vertices), 3, replace=False)
+    found = SegmentDistances(surface, at_vertices(surface, sources), limit).at_vertices
+    none, every = np.zeros(0, np.int64), np.arange(len(surface.vertices))
+    exact = igl.exact_geodesic(surface.vertices, surface.faces, sources, none, every, none)
+    near = exact < limit
+    assert near.any()
+    np.testing.assert_allclose(found[near], exact[near], rtol=1e-6, atol=1e-12)
+    assert (found[~near] > limit * (1.0 - 1e-9)).all()
+
+
+def test_a_path_bends_at_the_boundary():
+    """Around the hole of an annulus, the shortest path touches it and follows its edges."""
+    mesh = shapes.annulus(rings=10, hole=0.5)
+    start, end = (
+        int(np.argmin(np.linalg.norm(mesh.vertices - p, axis=1)))
+        for p in ([-0.9, 0, 0], [0.9, 0, 0])
+    )
+    found = SegmentDistances(mesh, at_vertices(mesh, [start]), 5.0).at_vertices[end]
+    none = np.zeros(0, np.int64)
+    exact = igl.exact_geodesic(
+        mesh.vertices, mesh.faces, np.array([start]), none, np.array([end]), none
+    )
+    assert found > 1.8  # longer than the straight line through the hole
+    assert found == pytest.approx(float(np.min(exact)), rel=1e-9)
+
+
+def test_the_orientation_of_the_mesh_does_not_matter(ring):
+    segments = inside_faces(ring, 4, seed=1)
+    points = random_surface_points(ring, 100, seed=8)
+    before = SegmentDistances(ring, segments, 0.4).at(points)
+    turned = nicmm.Mesh(ring.vertices, ring.faces[:, [0, 2, 1]])
+    order = [0, 2, 1]
+    mirrored = FaceSegments(segments.faces, segments.start[:, order], segments.end[:, order])
+    there = nicmm.SurfacePoints(points.faces, points.barycentric[:, order])
+    after = SegmentDistances(turned, mirrored, 0.4).at(there)
+    near = before < 0.4
+    assert 10 < near.sum()
+    np.testing.assert_allclose(after[near], before[near], rtol=1e-9)
+    assert (after[~near] >= 0.4).all()
+
+
+def test_several_segments_have_the_least_of_their_distances(ball):
+    parts = [inside_faces(ball, 1, seed) for seed in (1, 5)]
+    points = random_surface_points(ball, 100, seed=2)
+    both = SegmentDistances(ball, joined_segments(parts), 0.8).at(points)
+    each = np.min([SegmentDistances(ball, part, 0.8).at(points) for part in parts], axis=0)
+    near = each < 0.8
+    np.testing.assert_allclose(both[near], each[near], rtol=1e-9)
