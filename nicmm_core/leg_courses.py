@@ -68,7 +68,7 @@ def leg_courses(
         takes the course of the given curve. In each of the others the leg changes more than any
         other leg, and by more than `SAME_COURSE`.
     """
-    of_leg = {**options, "closed": False, "via_points": None}
+    of_leg = {**options, "closed": False, "via_points": None, "corners": None}
     ends = points[np.array([leg, (leg + 1) % len(points)])]
 
     def search(fraction: float, line: FloatArray) -> object:

@@ -353,12 +353,11 @@ def test_another_property_of_that_name_is_no_record(curve, value, sphere):
 def live_of(extension, curve, number):
     """A `LiveCurve`, a function that returns its points with one moved, and the opened curve."""
     edited_curve = module(extension, "outputs.edited_curve")
-    with_point = module(extension, "scene.point_lists").with_point
     opened = edited_curve.open_curve(bpy.context, curve)
 
     def moved(position):
         place = edited_curve.surface_points_at(opened, np.array([position]), "position")
-        return with_point(opened.points, number, place, replaced=True)
+        return edited_curve.with_point(opened.points, number, place, replaced=True)
 
     (request,) = edited_curve.request(opened, opened.points)
     return module(extension, "tool.live_curve").LiveCurve(request), moved, opened
