@@ -7,8 +7,8 @@ import numpy as np
 
 import bmesh
 
-NORMAL_BENDING = 0.3
-"""Blender's default."""
+NORMAL_BENDING = float(np.float32(0.3))
+"""Blender's default, in single precision as Blender stores it."""
 
 
 def installed_core():
