@@ -307,7 +307,7 @@ def with_point(
 ) -> ControlPoints:
     """Points with the single point `place` inserted at an index, or replacing the point there.
 
-    A replaced point stays a corner; an inserted one is none.
+    A replaced point stays a corner; an inserted point is smooth.
     """
     corners = points.corners
     if not replaced:

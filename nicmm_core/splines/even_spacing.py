@@ -159,8 +159,8 @@ def even_places(
     corners : (c,) int array, optional
         Indices among the points of control points that get points beside them.
     beside : float, default 0
-        Distance of these points from the corner along the polyline, in units of the points. There
-        are none if it is 0, or where a segment is too short for them.
+        Distance of these points from the corner along the polyline, in units of the points. They
+        are left out if it is 0, or where a segment is too short for them.
 
     Returns
     -------

@@ -68,8 +68,8 @@ def symmetric_curves(
     Yields
     ------
     DiscreteCurve
-        A simple curve. The one made of the half on the side of the given points comes first. There
-        is none for a half that crosses the plane elsewhere, or whose image cannot be traced.
+        A simple curve. The one made of the half on the side of the given points comes first. A half
+        that crosses the plane elsewhere, or whose image cannot be traced, is left out.
     SurfaceCurve
         The same curve without nodes close to edges.
     (n,) int array
