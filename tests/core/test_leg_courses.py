@@ -100,3 +100,14 @@ def test_a_replaced_leg_leaves_the_rest(torus, designer, points, closed):
         for number, (before, after) in enumerate(zip(legs(curve), legs(joined), strict=True)):
             expected = resample(part.points, 200, False)[0] if number == leg else before
             np.testing.assert_allclose(after, expected, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_other_courses_of_a_leg_keep_the_corners_of_the_curve(torus, designer, points):
+    curve = designer.design(points, corners=[1, 3]).curves[0]
+    design = leg_courses(
+        designer, points, curve, 0, alternatives=2, progress=ignored, corners=[1, 3]
+    )
+    for each in (design, *design.alternatives):
+        assert not judge(torus, each, points, True).faults
+        assert len(each.resumable.curve.corner_nodes) == 2
