@@ -1,0 +1,95 @@
+"""Divides faces at new vertices on their edges, such as those where values change their sign."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import edge_keys, edge_lengths, side_keys
+from .face_parts import FaceParts
+
+
+def side_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Length of the side opposite each corner, (f, 3)."""
+    sides = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    return edge_lengths(vertices, sides).reshape(-1, 3)
+
+
+def bisected(
+    parts: FaceParts, vertices: FloatArray, lengths: FloatArray, which: BoolArray, fixed: BoolArray
+) -> tuple[FaceParts, FloatArray]:
+    """Bisect the longest sides of some parts, and what else keeps the mesh conforming and sound.
+
+    A part one of whose sides is bisected is also bisected at its longest side, as in Rivara
+    ("Algorithms for refining triangular grids", 1984). Sides between two fixed vertices stay.
+    """
+    size = len(vertices)
+    sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
+    keys = edge_keys(sides[..., 0], sides[..., 1], size)
+    free = ~fixed[sides].all(axis=2)
+    # Of sides of equal length, the one with the greatest key counts as the longest in every part.
+    order = np.lexsort([keys, np.where(free, lengths, -1.0)], axis=1)
+    rows = np.arange(len(keys))
+    longest = keys[rows, order[:, -1]]
+    possible = free.any(axis=1)
+    marked = np.unique(longest[which & possible])
+    while True:
+        touched = np.isin(keys, marked).any(axis=1) & possible
+        more = np.union1d(marked, longest[touched])
+        if len(more) == len(marked):
+            break
+        marked = more
+    ends = np.stack(np.divmod(marked, size), axis=1)
+    middle = size + np.arange(len(marked))
+    return divided_at(parts, vertices, ends, middle, np.full(len(marked), 0.5))
+
+
+def divided_at(
+    parts: FaceParts, vertices: FloatArray, ends: IntArray, middle: IntArray, share: FloatArray
+) -> tuple[FaceParts, FloatArray]:
+    """Divide edges, (e, 2), at new vertices, in all parts; longer sides of a part first."""
+    places = (1.0 - share)[:, None] * vertices[ends[:, 0]] + share[:, None] * vertices[ends[:, 1]]
+    vertices = np.concatenate([vertices, places])
+    size = len(vertices)
+    keys = edge_keys(ends[:, 0], ends[:, 1], size)
+    order = np.argsort(keys)
+    keys, ends, middle, share = keys[order], ends[order], middle[order], share[order]
+    lengths = edge_lengths(vertices, ends)
+    while len(keys):
+        sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
+        of_sides = edge_keys(sides[..., 0], sides[..., 1], size)
+        at = np.searchsorted(keys, of_sides).clip(max=len(keys) - 1)
+        found = keys[at] == of_sides
+        which = np.flatnonzero(found.any(axis=1))
+        if not len(which):
+            break
+        long = np.where(found[which], lengths[at[which]], -1.0)
+        edge = at[which, long.argmax(axis=1)]
+        parts = parts.divided(which, ends[edge, 0], ends[edge, 1], middle[edge], share[edge])
+    return parts, vertices
+
+
+def positive_parts(
+    parts: FaceParts, vertices: FloatArray, values: FloatArray, snap: float
+) -> tuple[FaceParts, FloatArray]:
+    """The parts with positive values, divided where the values change sign; and all vertices.
+
+    Values up to `snap` become zero.
+    """
+    sign = np.where(values > snap, 1, np.where(values < -snap, -1, 0))
+    ends = edges_among(parts.faces[(sign[parts.faces] > 0).any(axis=1)], len(vertices))
+    ends = ends[sign[ends].prod(axis=1) < 0]
+    low, high = values[ends].T
+    middle = len(vertices) + np.arange(len(ends))
+    parts, vertices = divided_at(parts, vertices, ends, middle, low / (low - high))
+    at_corners = np.append(sign, np.zeros(len(ends), dtype=np.int64))[parts.faces]
+    outside = (at_corners >= 0).all(axis=1) & (at_corners > 0).any(axis=1)
+    # On a part whose corners all lie on the line, the values before snapping decide.
+    on_line = (at_corners == 0).all(axis=1)
+    mean = np.append(values, np.zeros(len(ends)))[parts.faces].sum(axis=1)
+    return parts.taken(outside | (on_line & (mean > 0.0))), vertices
+
+
+def edges_among(faces: IntArray, size: int) -> IntArray:
+    """The edges of faces whose corner indices are below ``size``, (e, 2), smaller index first."""
+    return np.stack(np.divmod(np.unique(side_keys(faces, size)), size), axis=1)
