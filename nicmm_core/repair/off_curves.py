@@ -27,13 +27,12 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
 from ..geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
-from ..geometry.mesh import Mesh, edge_keys, edge_lengths
+from ..geometry.mesh import Mesh, edge_keys, edge_lengths, side_keys
 from ..geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
 from ..geometry.surface_points import SurfacePoints
 from ..outputs.cut import CutMesh, cut_mesh
 from ..progress import checkpoint
 from .clean_surface import CleanSurface
-from .divided_faces import bisected, divided_at, edges_among, positive_parts, side_lengths
 from .face_parts import FaceParts, whole_faces
 from .mapped_mesh import MappedMesh
 from .nonmanifold import manifold
@@ -367,7 +366,7 @@ def _beyond(
     accurate = np.zeros(len(parts.faces), dtype=bool)
     while True:
         checkpoint()
-        lengths = side_lengths(vertices, parts.faces)
+        lengths = _side_lengths(vertices, parts.faces)
         longest, at_corners = lengths.max(axis=1), values[parts.faces]
         large = longest > COARSEST * clearance
         # On a small face, the line may cross a side without enclosing an end of it; if it is an arc
@@ -386,14 +385,14 @@ def _beyond(
         if not straddles.any():
             break
         before = parts
-        parts, vertices = bisected(parts, vertices, lengths, straddles, fixed)
+        parts, vertices = _bisected(parts, vertices, lengths, straddles, fixed)
         count = len(before.faces)
         accurate &= (parts.faces[:count] == before.faces).all(axis=1)
         accurate = np.append(accurate, np.zeros(len(parts.faces) - count, dtype=bool))
         unknown = np.full(len(vertices) - len(values), np.nan)
         values = _evaluated(distances, parts, np.append(values, unknown))
         fixed = np.append(fixed, np.zeros(len(vertices) - len(fixed), dtype=bool))
-    parts, vertices = positive_parts(parts, vertices, values - level, SNAP * clearance)
+    parts, vertices = _kept(parts, vertices, values - level, SNAP * clearance)
     return others.joined(parts), vertices
 
 
@@ -415,6 +414,92 @@ def _errors(distances: SegmentDistances, parts: FaceParts, at_corners: FloatArra
     points = SurfacePoints(parts.parent.repeat(len(shares)), weights)
     exact = distances.at(points).reshape(-1, len(shares))
     return np.abs(at_corners @ shares.T - exact).max(axis=1)
+
+
+def _side_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Length of the side opposite each corner, (f, 3)."""
+    sides = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    return edge_lengths(vertices, sides).reshape(-1, 3)
+
+
+def _bisected(
+    parts: FaceParts, vertices: FloatArray, lengths: FloatArray, which: BoolArray, fixed: BoolArray
+) -> tuple[FaceParts, FloatArray]:
+    """Bisect the longest sides of some parts, and what else keeps the mesh conforming and sound.
+
+    A part one of whose sides is bisected is also bisected at its longest side, as in Rivara
+    ("Algorithms for refining triangular grids", 1984). Sides between two fixed vertices stay.
+    """
+    size = len(vertices)
+    sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
+    keys = edge_keys(sides[..., 0], sides[..., 1], size)
+    free = ~fixed[sides].all(axis=2)
+    # Of sides of equal length, the one with the greatest key counts as the longest in every part.
+    order = np.lexsort([keys, np.where(free, lengths, -1.0)], axis=1)
+    rows = np.arange(len(keys))
+    longest = keys[rows, order[:, -1]]
+    possible = free.any(axis=1)
+    marked = np.unique(longest[which & possible])
+    while True:
+        touched = np.isin(keys, marked).any(axis=1) & possible
+        more = np.union1d(marked, longest[touched])
+        if len(more) == len(marked):
+            break
+        marked = more
+    ends = np.stack(np.divmod(marked, size), axis=1)
+    middle = size + np.arange(len(marked))
+    return _divided(parts, vertices, ends, middle, np.full(len(marked), 0.5))
+
+
+def _divided(
+    parts: FaceParts, vertices: FloatArray, ends: IntArray, middle: IntArray, share: FloatArray
+) -> tuple[FaceParts, FloatArray]:
+    """Divide edges, (e, 2), at new vertices, in all parts; longer sides of a part first."""
+    places = (1.0 - share)[:, None] * vertices[ends[:, 0]] + share[:, None] * vertices[ends[:, 1]]
+    vertices = np.concatenate([vertices, places])
+    size = len(vertices)
+    keys = edge_keys(ends[:, 0], ends[:, 1], size)
+    order = np.argsort(keys)
+    keys, ends, middle, share = keys[order], ends[order], middle[order], share[order]
+    lengths = edge_lengths(vertices, ends)
+    while len(keys):
+        sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
+        of_sides = edge_keys(sides[..., 0], sides[..., 1], size)
+        at = np.searchsorted(keys, of_sides).clip(max=len(keys) - 1)
+        found = keys[at] == of_sides
+        which = np.flatnonzero(found.any(axis=1))
+        if not len(which):
+            break
+        long = np.where(found[which], lengths[at[which]], -1.0)
+        edge = at[which, long.argmax(axis=1)]
+        parts = parts.divided(which, ends[edge, 0], ends[edge, 1], middle[edge], share[edge])
+    return parts, vertices
+
+
+def _kept(
+    parts: FaceParts, vertices: FloatArray, values: FloatArray, snap: float
+) -> tuple[FaceParts, FloatArray]:
+    """The parts with positive values, divided where the values change sign; and all vertices.
+
+    Values up to `snap` become zero.
+    """
+    sign = np.where(values > snap, 1, np.where(values < -snap, -1, 0))
+    ends = _edges(parts.faces[(sign[parts.faces] > 0).any(axis=1)], len(vertices))
+    ends = ends[sign[ends].prod(axis=1) < 0]
+    low, high = values[ends].T
+    middle = len(vertices) + np.arange(len(ends))
+    parts, vertices = _divided(parts, vertices, ends, middle, low / (low - high))
+    at_corners = np.append(sign, np.zeros(len(ends), dtype=np.int64))[parts.faces]
+    outside = (at_corners >= 0).all(axis=1) & (at_corners > 0).any(axis=1)
+    # On a part whose corners all lie on the line, the values before snapping decide.
+    on_line = (at_corners == 0).all(axis=1)
+    mean = np.append(values, np.zeros(len(ends)))[parts.faces].sum(axis=1)
+    return parts.taken(outside | (on_line & (mean > 0.0))), vertices
+
+
+def _edges(faces: IntArray, size: int) -> IntArray:
+    """The edges of faces whose corner indices are below ``size``, (e, 2), smaller index first."""
+    return np.stack(np.divmod(np.unique(side_keys(faces, size)), size), axis=1)
 
 
 def _barriers(mapped: MappedMesh, avoided: Avoided, clearance: float) -> list[SurfaceCurve]:
@@ -470,7 +555,7 @@ def _gap(mesh: Mesh, avoided: Avoided, arc: float, clearance: float) -> float:
         (np.searchsorted(avoided.arcs, arc, side="right") - 1).clip(0, len(avoided.arcs) - 2)
     )
     corners = mesh.faces[avoided.segment_faces[segment]]
-    width = GAP * float(side_lengths(mesh.vertices, mesh.faces[mesh.faces_at(corners)]).max())
+    width = GAP * float(_side_lengths(mesh.vertices, mesh.faces[mesh.faces_at(corners)]).max())
     return min(width, GAP_OF_CLEARANCE * clearance) if clearance > 0.0 else width
 
 
@@ -495,24 +580,24 @@ def _without_strips(
     on_chain = np.zeros(size, dtype=bool)
     on_chain[chain] = True
     near = on_chain[parts.faces].sum(axis=1) >= 2
-    sides = edges_among(parts.faces[near], size)
+    sides = _edges(parts.faces[near], size)
     both = sides[on_chain[sides].all(axis=1)]
     both = both[
         ~np.isin(edge_keys(both[:, 0], both[:, 1], size), edge_keys(chain[:, 0], chain[:, 1], size))
     ]
     middle = size + np.arange(len(both))
-    parts, vertices = divided_at(parts, vertices, both, middle, np.full(len(both), 0.5))
+    parts, vertices = _divided(parts, vertices, both, middle, np.full(len(both), 0.5))
     on_chain = np.append(on_chain, np.zeros(len(both), dtype=bool))
 
     touched = on_chain[parts.faces].any(axis=1)
-    sides = edges_among(parts.faces[touched], len(vertices))
+    sides = _edges(parts.faces[touched], len(vertices))
     ends = sides[on_chain[sides].sum(axis=1) == 1]
     ends = np.where(on_chain[ends[:, :1]], ends, ends[:, ::-1])
     share = np.full(len(ends), STRIP)
     if clearance > 0.0:
         share = np.minimum(share, STRIP_OF_CLEARANCE * clearance / edge_lengths(vertices, ends))
     middle = len(vertices) + np.arange(len(ends))
-    parts, vertices = divided_at(parts, vertices, ends, middle, share)
+    parts, vertices = _divided(parts, vertices, ends, middle, share)
     on_chain = np.append(on_chain, np.zeros(len(ends), dtype=bool))
     return parts.taken(~on_chain[parts.faces].any(axis=1)), vertices
 
