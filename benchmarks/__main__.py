@@ -53,6 +53,7 @@ MEASUREMENTS = (
     "defects",
     "gallery",
     "obstacles",
+    "several_curves",
     "lanes",
     "sharp_edges",
     "guarantee",

@@ -29,6 +29,7 @@ from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import BatchRules, relax_curves
+from .segment_distances import SegmentPaths, TooManyWindowsError
 from .steps import (
     ContactRules,
     EnergyRules,
@@ -61,11 +62,13 @@ __all__ = [
     "PathArrays",
     "PlacementRules",
     "RelaxationRules",
+    "SegmentPaths",
     "SpacingRules",
     "StepLimits",
     "StepRules",
     "SurfaceArrays",
     "TraceArrays",
+    "TooManyWindowsError",
     "TraceLimits",
     "best_legs",
     "cell_sets",

@@ -20,9 +20,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from nicmm_kernels import TooManyWindowsError
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..errors import ControlPointError, CurveError, PointName, UnreachableError
+from ..errors import ArgumentError, ControlPointError, CurveError, PointName, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
@@ -41,10 +43,11 @@ from .removed_faces import points_at
 FADE = 2.0
 """Length of an avoided curve, on either side of a junction, without clearance; in clearances."""
 
-LEVEL = 0.992
+LEVEL = 1.02
 """Distance at which the surface is divided, in clearances.
 
-The distance that is kept differs from it by up to `SNAP` and about `ERROR`."""
+The distance that is kept differs from it by up to `SNAP` and about `ERROR`, so it is not less than
+the clearance."""
 
 COARSEST = 2.0
 """Greatest longest edge of the faces that are divided at the clearance, in clearances."""
@@ -52,19 +55,20 @@ COARSEST = 2.0
 FINEST = 1.0 / 16.0
 """Length of an edge up to which faces are accurate enough in any case, in clearances."""
 
-ERROR = 0.003
+ERROR = 0.012
 """Greatest error of distances that are interpolated on these faces, at their centroids and in the
 middle of their sides, in clearances. Faces with greater errors are bisected further."""
 
-SNAP = 0.008
+SNAP = 0.006
 """Distance up to which the line at the clearance is moved to a vertex, in clearances."""
 
 MEETING = 1e-8
 """Greatest distance between a control point and the place at which the curve may meet an avoided
 curve, in bounding-box diagonals."""
 
-REACH = 3.2
-"""Distance up to which distances are computed, in clearances."""
+REACH = 2.0
+"""Distance beyond the line up to which distances are computed, in lengths of the longest edge of
+the faces there, if that is at most `COARSEST`."""
 
 RINGS = 3
 """Number of rings of faces, around those within reach, that may be bisected with them."""
@@ -222,7 +226,7 @@ def surface_off_curves(
         near = [_with_clearance(mapped, each, clearance) for each in avoided]
         segments = joined_segments(near)
         if len(segments):
-            distances = SegmentDistances(mesh, segments, REACH * clearance)
+            distances = _distances(mesh, segments, clearance)
             parts, vertices = _beyond(distances, parts, vertices, clearance)
     if not len(parts.faces):
         return None
@@ -347,6 +351,22 @@ def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
     return FaceSegments(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))
 
 
+def _distances(mesh: Mesh, segments: FaceSegments, clearance: float) -> SegmentDistances:
+    """Distances from the segments as far as they are needed."""
+    # A straight distance is not greater than a distance along the surface.
+    away, _ = cKDTree(np.concatenate(segments.positions(mesh))).query(mesh.vertices)
+    lengths = _side_lengths(mesh.vertices, mesh.faces)
+    near = away[mesh.faces].min(axis=1) <= LEVEL * clearance + lengths.max(axis=1)
+    longest = min(lengths[near].max(initial=0.0), COARSEST * clearance)
+    try:
+        return SegmentDistances(mesh, segments, LEVEL * clearance + REACH * longest)
+    except TooManyWindowsError as error:
+        raise ArgumentError(
+            f"clearance is {clearance:g}, which reaches over too many faces of this mesh; use a "
+            "smaller one"
+        ) from error
+
+
 def _beyond(
     distances: SegmentDistances, parts: FaceParts, vertices: FloatArray, clearance: float
 ) -> tuple[FaceParts, FloatArray]:
@@ -432,20 +452,21 @@ def _bisected(
     """
     size = len(vertices)
     sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
-    keys = edge_keys(sides[..., 0], sides[..., 1], size)
+    keys, edge = np.unique(edge_keys(sides[..., 0], sides[..., 1], size), return_inverse=True)
+    edge = edge.reshape(-1, 3)
     free = ~fixed[sides].all(axis=2)
     # Of sides of equal length, the one with the greatest key counts as the longest in every part.
-    order = np.lexsort([keys, np.where(free, lengths, -1.0)], axis=1)
-    rows = np.arange(len(keys))
-    longest = keys[rows, order[:, -1]]
+    order = np.lexsort([edge, np.where(free, lengths, -1.0)], axis=1)
+    longest = np.take_along_axis(edge, order[:, -1:], axis=1)[:, 0]
     possible = free.any(axis=1)
-    marked = np.unique(longest[which & possible])
+    is_marked = np.zeros(len(keys), dtype=bool)
+    is_marked[longest[which & possible]] = True
     while True:
-        touched = np.isin(keys, marked).any(axis=1) & possible
-        more = np.union1d(marked, longest[touched])
-        if len(more) == len(marked):
+        touched = is_marked[edge].any(axis=1) & possible
+        if is_marked[longest[touched]].all():
             break
-        marked = more
+        is_marked[longest[touched]] = True
+    marked = keys[is_marked]
     ends = np.stack(np.divmod(marked, size), axis=1)
     middle = size + np.arange(len(marked))
     return _divided(parts, vertices, ends, middle, np.full(len(marked), 0.5))

@@ -1,8 +1,10 @@
 """The door of the compiled kernels: what does not fit raises an error, and crashes nothing."""
 
+import contextlib
 import pickle
 import subprocess
 import sys
+from unittest import mock
 
 import nicmm_kernels
 import numpy as np
@@ -19,6 +21,7 @@ BALL = shapes.sphere(2)
 CONTACT_RULES = nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12, 2.0)
 PLACEMENT = nicmm_kernels.PlacementRules(1e-6, 1e-5, 1.0, 0.1, 6)
 LIMITS = nicmm_kernels.TraceLimits(1e-6, 4096)
+FEW_WINDOWS = 4_000
 BAD_NUMBERS = st.sampled_from([np.nan, np.inf, -np.inf])
 BAD_INDICES = st.integers(-(2**62), 2**62).filter(lambda i: not 0 <= i < len(BALL.faces))
 
@@ -308,6 +311,31 @@ def arguments_paths(q=12):
     }
 
 
+def arguments_segments_in_faces(s=6):
+    """Arguments of `distances_from_segments` for s separate segments and s points, by name."""
+    third, half = np.full((s, 3), 1.0 / 3.0), np.tile([0.5, 0.3, 0.2], (s, 1))
+    return {
+        "mesh": BALL.for_kernels,
+        "faces": 3 * np.arange(s),
+        "starts": third,
+        "ends": half,
+        "previous": np.full(s, -1),
+        "following": np.full(s, -1),
+        "limit": 0.8,
+        "scale": 1e-14,
+        "meanwhile": nothing,
+        "at_faces": 3 * np.arange(s) + 1,
+        "at_barycentric": third.copy(),
+    }
+
+
+def distances_from_segments(at_faces, at_barycentric, **given):
+    """The sides that shortest paths enter, and the distances of points."""
+    with mock.patch.object(nicmm_kernels.segment_distances, "MOST_WINDOWS", FEW_WINDOWS):
+        paths = nicmm_kernels.SegmentPaths(**given)
+    return paths.sides, paths.at(at_faces, at_barycentric)
+
+
 def arguments_turning(k=2, n=8):
     """Arguments of `turning_paths` with k control points among n cells, all joined, by name."""
     generator = np.random.default_rng(7)
@@ -405,6 +433,7 @@ CALLS = {
     "distances_along_edges": (nicmm_kernels.distances_along_edges, arguments_distances),
     "nearest_cells": (nicmm_kernels.nearest_cells, arguments_cells),
     "points_on_edge_paths": (nicmm_kernels.points_on_edge_paths, arguments_paths),
+    "distances_from_segments": (distances_from_segments, arguments_segments_in_faces),
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
     "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
@@ -424,6 +453,7 @@ CALLS = {
 FINITE = {
     "trace_from": [("barycentric", None), ("directions", None), ("lengths", None)],
     "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
+    "distances_from_segments": [("starts", None), ("ends", None)],
     "trace_steps": [("places", 1)],
     "relax_curves": [("barycentric", None)],
     "CurveRelaxation": [("barycentric", None)],
@@ -431,6 +461,7 @@ FINITE = {
 """Arrays whose values have to be finite; others may have any values."""
 
 INDICES = {
+    "distances_from_segments": [("faces", None), ("at_faces", None)],
     "trace_steps": [("places", 0), ("start", None), ("end", None)],
     "place_nodes": [("faces", None)],
     "place_on_polyline": [("faces", None), ("controls", None)],
@@ -468,6 +499,7 @@ OF_ANY_LENGTH = [
 ON_MESHES = [
     "EdgeGraphArrays",
     "TraceArrays",
+    "distances_from_segments",
     "place_nodes",
     "relax_curves",
     "trace_between",
@@ -477,6 +509,7 @@ ON_MESHES = [
 """Kernels that read a mesh."""
 
 RESUMED = [
+    "distances_from_segments",
     "distinct_curves",
     "distances_along_edges",
     "meeting_segments",
@@ -607,7 +640,9 @@ def test_meshes_with_arbitrary_neighbours_crash_nothing(name, seed):
     mesh = nicmm_kernels.MeshArrays(
         BALL.vertices, BALL.faces, BALL.face_normals, opposite, oriented
     )
-    function(**with_mesh(arguments(), mesh))
+    # Paths over such a mesh may not end before there is no room for them.
+    with contextlib.suppress(nicmm_kernels.TooManyWindowsError):
+        function(**with_mesh(arguments(), mesh))
 
 
 @pytest.mark.parametrize(
@@ -722,6 +757,25 @@ def test_curves_without_a_fixed_start_or_without_nodes_are_refused(name):
     key = "faces" if "faces" in given else "fixed"
     with pytest.raises(KernelError, match="one row per curve"):
         function(**{**given, key: given[key][:, :0]})
+
+
+@given(BAD_INDICES.filter(lambda i: i != -1), st.sampled_from(["previous", "following"]))
+def test_neighbours_that_do_not_exist_are_refused(index, name):
+    given = arguments_segments_in_faces()
+    given[name][3] = index
+    with pytest.raises(KernelError, match="index is out of range"):
+        distances_from_segments(**given)
+
+
+def test_windows_that_do_not_fit_get_more_room_up_to_a_limit(monkeypatch):
+    whole = distances_from_segments(**arguments_segments_in_faces())
+    monkeypatch.setattr(nicmm_kernels.segment_distances, "WINDOWS_OF_A_SEGMENT", 1)
+    few = distances_from_segments(**arguments_segments_in_faces())
+    for one, other in zip(whole, few, strict=True):
+        assert np.array_equal(one, other)
+    monkeypatch.setitem(globals(), "FEW_WINDOWS", 20)
+    with pytest.raises(nicmm_kernels.TooManyWindowsError, match="more than"):
+        distances_from_segments(**arguments_segments_in_faces())
 
 
 @pytest.mark.parametrize("name", ["relax_curves", "even_places"])
