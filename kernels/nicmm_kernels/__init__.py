@@ -16,6 +16,7 @@ from .edge_paths import (
 )
 from .least_sums import least_sums
 from .legs import PathArrays, best_legs, cell_sets, distinct_routes
+from .level_refinement import LevelLimits, PartArrays, refine_at_level
 from .levels import (
     CurveArrays,
     CurveRelaxation,
@@ -52,6 +53,7 @@ __all__ = [
     "EdgeGraphArrays",
     "EnergyRules",
     "KernelError",
+    "LevelLimits",
     "LevelOutcome",
     "LevelRules",
     "LevelState",
@@ -59,6 +61,7 @@ __all__ = [
     "MeshArrays",
     "MissingLibraryError",
     "NodeArrays",
+    "PartArrays",
     "PathArrays",
     "PlacementRules",
     "RelaxationRules",
@@ -87,6 +90,7 @@ __all__ = [
     "places_on_traces",
     "points_on_edge_paths",
     "polyline_crossings",
+    "refine_at_level",
     "relax_curves",
     "segment_ends",
     "trace_between",

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from .library import (
 )
 from .traces import MeshArrays, MeshPointers
 
-WINDOWS_OF_A_SEGMENT = 64
+WINDOWS_OF_A_SEGMENT = 256
 """Number of windows of each segment for which there is room at first."""
 
 MOST_WINDOWS = 4_000_000
@@ -34,7 +35,9 @@ MOST_WINDOWS = 4_000_000
 _NUMBERS = 11
 
 
-class _Propagation(ctypes.Structure):
+class PathPointers(ctypes.Structure):
+    """`SegmentPaths` as the library reads and writes them."""
+
     _fields_ = [
         ("s", COUNT),
         ("faces", POINTER),
@@ -59,10 +62,10 @@ class _Propagation(ctypes.Structure):
 
 
 _SEGMENT_DISTANCES = Kernel(
-    "segment_distances", MeshPointers, _Propagation, COUNT, ctypes.POINTER(COUNT)
+    "segment_distances", MeshPointers, PathPointers, COUNT, ctypes.POINTER(COUNT)
 )
 _DISTANCES_OF_POINTS = Kernel(
-    "distances_of_points", MeshPointers, _Propagation, COUNT, POINTER, POINTER, POINTER
+    "distances_of_points", MeshPointers, PathPointers, COUNT, POINTER, POINTER, POINTER
 )
 
 
@@ -126,7 +129,7 @@ class SegmentPaths:
         room = WINDOWS_OF_A_SEGMENT * (s + 1)
         while True:
             self.vertex_distances = np.full(mesh.vertex_count, np.inf)
-            sides, windows = np.zeros(room, dtype=np.int64), np.zeros((room, _NUMBERS))
+            sides, windows = np.empty(room, dtype=np.int64), np.empty((room, _NUMBERS))
             if self._follow(pointers, s, sides, windows, meanwhile):
                 break
             if 2 * room > MOST_WINDOWS:
@@ -150,9 +153,9 @@ class SegmentPaths:
     ) -> bool:
         """Find all windows; returns whether there was room for them."""
         v, room = self.mesh.vertex_count, len(sides)
-        corners, items = np.zeros(v, dtype=np.int64), np.zeros(v + room, dtype=np.int64)
-        arrivals, costs, places = np.zeros(v), np.zeros(v + room), np.full(v + room, -1)
-        work = _Propagation(
+        corners, items = np.empty(v, dtype=np.int64), np.empty(v + room, dtype=np.int64)
+        arrivals, costs, places = np.empty(v), np.empty(v + room), np.full(v + room, -1)
+        work = PathPointers(
             s, *pointers, self._limit, self._scale, self.vertex_distances.ctypes.data, room, 0,
             sides.ctypes.data, windows.ctypes.data, corners.ctypes.data, arrivals.ctypes.data, 0,
             costs.ctypes.data, items.ctypes.data, places.ctypes.data,
@@ -172,11 +175,15 @@ class SegmentPaths:
         m = rows("faces", faces)
         given = address("faces", faces, INT, m), address("barycentric", barycentric, FLOAT, m, 3)
         distances = np.zeros(m)
-        found = _Propagation(
+        _DISTANCES_OF_POINTS(self.mesh.pointers, self.pointers, m, *given, distances.ctypes.data)
+        return distances
+
+    @cached_property
+    def pointers(self) -> PathPointers:
+        """The paths as the library reads them."""
+        return PathPointers(
             s=len(self._faces), faces=self._faces.ctypes.data, starts=self._starts.ctypes.data,
             ends=self._ends.ctypes.data, scale=self._scale, room=len(self.sides),
             distances=self.vertex_distances.ctypes.data, count=len(self.sides),
             sides=self.sides.ctypes.data, windows=self._windows.ctypes.data,
         )  # fmt: skip
-        _DISTANCES_OF_POINTS(self.mesh.pointers, found, m, *given, distances.ctypes.data)
-        return distances

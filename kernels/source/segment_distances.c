@@ -8,10 +8,11 @@
    that no shortest path enters are removed with the criterion of Xin and Wang ("Improving Chen and
    Han's algorithm on the discrete geodesic problem", 2009). The cost follows the surface within the
    limit, not the size of the mesh. */
+#include "segment_distances.h"
+
 #include <string.h>
 
 #include "arc_tangent.h"
-#include "mesh.h"
 #include "queue.h"
 #include "vectors.h"
 
@@ -26,46 +27,6 @@ enum { HALVINGS = 7 };
 
 /* Amount by which the angle around a vertex is greater than a full angle at least, if it is. */
 static const double SADDLE = 1e-9;
-
-typedef struct {
-    double x, y;
-} Vector;
-
-/* An interval of an edge, seen from a segment in the plane of the face beyond the edge. The edge
-   runs along the x axis, from the first end of the side, at the origin, to the second one. The face
-   beyond has y > 0, the segment y <= 0. */
-typedef struct {
-    Vector start, end;          /* of the segment, equal for a point */
-    double before;              /* distance of the segment itself */
-    double low, high;           /* ends of the interval */
-    Vector at_low, at_high;     /* directions of the lines through these ends */
-} Window;
-
-typedef struct {
-    /* Input. */
-    int64_t s;                  /* number of segments */
-    const int64_t *faces;       /* (s) face of each */
-    const double *starts;       /* (s, 3) barycentric coordinates of its ends */
-    const double *ends;
-    const int64_t *previous;    /* (s) the segment that ends where it begins, or -1 */
-    const int64_t *following;   /* (s) the segment that begins where it ends, or -1 */
-    double limit;
-    double scale;               /* distance below which points are the same */
-    /* Output. */
-    double *distances;          /* (V) of the vertices; infinite at first */
-    int64_t room;
-    int64_t count;              /* number of windows */
-    int64_t *sides;             /* (room) side of the face beyond; -1 for a useless window */
-    Window *windows;            /* (room) */
-    /* Work in progress. */
-    int64_t *corners;           /* (V) the corner at which the path to each vertex arrives */
-    double *arrivals;           /* (V) angle there from the first end of the side opposite to it to
-                                   the path, in the face */
-    int64_t queued;             /* number of items in the queue: vertices, then windows */
-    double *costs;              /* (V + room) */
-    int64_t *items;
-    int64_t *places;            /* -1 at first */
-} Propagation;
 
 static double cross_of(Vector one, Vector other)
 {
@@ -657,42 +618,46 @@ static int64_t first_not_below(const int64_t *numbers, int64_t count, int64_t wa
     return low;
 }
 
-/* Distances of m points. Windows are in the order of their sides, segments in that of their faces.
-   Greater distances than the limit may be too great. */
+int distance_of_point(const Mesh *mesh, const Propagation *found, int64_t face,
+                      const double weights[3], double *distance)
+{
+    double position[3], least = INFINITY;
+    const double *corners[3];
+    Plane plane;
+    TRY(corners_of(mesh, face, corners));
+    interpolate(corners, weights, position);
+    for (int j = 0; j < 3; j++) {
+        int64_t vertex;
+        TRY(vertex_at(mesh, 3 * face + j, &vertex));
+        double through = found->distances[vertex] + distance_between(position, corners[j]);
+        least = lesser(least, through);
+    }
+    TRY(plane_of(mesh, 3 * face, &plane));
+    Vector point = point_in(&plane, 0, weights);
+    int64_t k = first_not_below(found->faces, found->s, face);
+    for (; k < found->s && found->faces[k] == face; k++) {
+        Vector start = point_in(&plane, 0, found->starts + 3 * k);
+        Vector end = point_in(&plane, 0, found->ends + 3 * k);
+        least = lesser(least, norm(way(nearest_on(start, end, point), point)));
+    }
+    k = first_not_below(found->sides, found->count, 3 * face);
+    for (int64_t side = 3 * face; k < found->count && found->sides[k] < 3 * face + 3; k++) {
+        if (found->sides[k] != side) {
+            side = found->sides[k];
+            TRY(plane_of(mesh, side, &plane));
+            point = point_in(&plane, side % 3, weights);
+        }
+        least = lesser(least, distance_if_seen(&found->windows[k], point, found->scale));
+    }
+    *distance = least;
+    return OK;
+}
+
+/* Distances of m points, as `distance_of_point` finds them. */
 EXPORTED int distances_of_points(const Mesh *mesh, const Propagation *found, int64_t m,
                                  const int64_t *faces, const double *barycentric, double *distances)
 {
-    for (int64_t i = 0; i < m; i++) {
-        const double *weights = barycentric + 3 * i;
-        double position[3], least = INFINITY;
-        const double *corners[3];
-        int64_t face = faces[i];
-        TRY(corners_of(mesh, face, corners));
-        interpolate(corners, weights, position);
-        for (int j = 0; j < 3; j++) {
-            int64_t vertex;
-            TRY(vertex_at(mesh, 3 * face + j, &vertex));
-            double through = found->distances[vertex] + distance_between(position, corners[j]);
-            least = lesser(least, through);
-        }
-        Plane plane = {{0}, {0}, {0}, 0.0, {0.0, 0.0}};
-        int64_t k = first_not_below(found->faces, found->s, face);
-        if (k < found->s && found->faces[k] == face) TRY(plane_of(mesh, 3 * face, &plane));
-        for (; k < found->s && found->faces[k] == face; k++) {
-            Vector start = point_in(&plane, 0, found->starts + 3 * k), point;
-            Vector end = point_in(&plane, 0, found->ends + 3 * k);
-            point = point_in(&plane, 0, weights);
-            least = lesser(least, norm(way(nearest_on(start, end, point), point)));
-        }
-        k = first_not_below(found->sides, found->count, 3 * face);
-        int64_t before = -1;
-        for (; k < found->count && found->sides[k] < 3 * face + 3; k++) {
-            if (found->sides[k] != before) TRY(plane_of(mesh, found->sides[k], &plane));
-            before = found->sides[k];
-            Vector point = point_in(&plane, before % 3, weights);
-            least = lesser(least, distance_if_seen(&found->windows[k], point, found->scale));
-        }
-        distances[i] = least;
-    }
+    for (int64_t i = 0; i < m; i++)
+        TRY(distance_of_point(mesh, found, faces[i], barycentric + 3 * i, distances + i));
     return OK;
 }

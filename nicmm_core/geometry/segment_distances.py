@@ -72,13 +72,17 @@ class SegmentDistances:
     segments : FaceSegments
     limit : float
         Distance up to which distances are computed, in mesh units.
+
+    Attributes
+    ----------
+    paths : nicmm_kernels.SegmentPaths
     """
 
     def __init__(self, mesh: Mesh, segments: FaceSegments, limit: float) -> None:
         self.mesh, self.segments, self.limit = mesh, segments, limit
         scale = SAME_POINT * mesh.diagonal
         previous, following = _neighbours(mesh, segments, scale)
-        self._paths = nicmm_kernels.SegmentPaths(
+        self.paths = nicmm_kernels.SegmentPaths(
             mesh.for_kernels,
             np.ascontiguousarray(segments.faces),
             np.ascontiguousarray(segments.start),
@@ -94,13 +98,13 @@ class SegmentDistances:
     @property
     def at_vertices(self) -> FloatArray:
         """Distance of each vertex, (V,); greater ones than the limit may be too great."""
-        return self._paths.vertex_distances
+        return self.paths.vertex_distances
 
     @cached_property
     def faces_reached(self) -> BoolArray:
         """Whether each face may have points within the limit, (F,)."""
         reached = (self.at_vertices < self.limit)[self.mesh.faces].any(axis=1)
-        reached[self.segments.faces] = reached[self._paths.sides // 3] = True
+        reached[self.segments.faces] = reached[self.paths.sides // 3] = True
         return reached
 
     def _bound_corners(self) -> None:
@@ -118,7 +122,7 @@ class SegmentDistances:
     def at(self, points: SurfacePoints) -> FloatArray:
         """Distance of points, (n,); greater ones than the limit may be too great or infinite."""
         checkpoint()
-        return self._paths.at(
+        return self.paths.at(
             np.ascontiguousarray(points.faces), np.ascontiguousarray(points.barycentric)
         )
 

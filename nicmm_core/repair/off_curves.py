@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
-from nicmm_kernels import TooManyWindowsError
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -29,7 +29,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
 from ..geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
-from ..geometry.mesh import Mesh, edge_keys, edge_lengths, side_keys
+from ..geometry.mesh import Mesh, edge_keys, edge_lengths, opposite_sides, side_keys
 from ..geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
 from ..geometry.surface_points import SurfacePoints
 from ..outputs.cut import CutMesh, cut_mesh
@@ -66,7 +66,7 @@ MEETING = 1e-8
 """Greatest distance between a control point and the place at which the curve may meet an avoided
 curve, in bounding-box diagonals."""
 
-REACH = 2.0
+REACH = 1.25
 """Distance beyond the line up to which distances are computed, in lengths of the longest edge of
 the faces there, if that is at most `COARSEST`."""
 
@@ -354,13 +354,15 @@ def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
 def _distances(mesh: Mesh, segments: FaceSegments, clearance: float) -> SegmentDistances:
     """Distances from the segments as far as they are needed."""
     # A straight distance is not greater than a distance along the surface.
-    away, _ = cKDTree(np.concatenate(segments.positions(mesh))).query(mesh.vertices)
-    lengths = _side_lengths(mesh.vertices, mesh.faces)
-    near = away[mesh.faces].min(axis=1) <= LEVEL * clearance + lengths.max(axis=1)
-    longest = min(lengths[near].max(initial=0.0), COARSEST * clearance)
+    longest = _side_lengths(mesh.vertices, mesh.faces).max(axis=1)
+    away, _ = cKDTree(np.concatenate(segments.positions(mesh))).query(
+        mesh.vertices, distance_upper_bound=LEVEL * clearance + longest.max()
+    )
+    near = away[mesh.faces].min(axis=1) <= LEVEL * clearance + longest
+    longest = min(longest[near].max(initial=0.0), COARSEST * clearance)
     try:
         return SegmentDistances(mesh, segments, LEVEL * clearance + REACH * longest)
-    except TooManyWindowsError as error:
+    except nicmm_kernels.TooManyWindowsError as error:
         raise ArgumentError(
             f"clearance is {clearance:g}, which reaches over too many faces of this mesh; use a "
             "smaller one"
@@ -381,95 +383,43 @@ def _beyond(
     fixed = np.zeros(len(vertices), dtype=bool)
     fixed[others.faces] = True
 
-    level, values = LEVEL * clearance, np.full(len(vertices), np.nan)
-    values = _evaluated(distances, parts, values)
-    accurate = np.zeros(len(parts.faces), dtype=bool)
-    while True:
-        checkpoint()
-        lengths = _side_lengths(vertices, parts.faces)
-        longest, at_corners = lengths.max(axis=1), values[parts.faces]
-        large = longest > COARSEST * clearance
-        # On a small face, the line may cross a side without enclosing an end of it; if it is an arc
-        # about a point, it reaches this far into the face.
-        margin = np.where(large, longest, longest**2 / (8.0 * clearance))
-        straddles = (at_corners.min(axis=1) <= level + margin) & (
-            at_corners.max(axis=1) >= level - margin
-        )
-        straddles &= reached[parts.parent]
-        check = np.flatnonzero(straddles & ~large & ~accurate)
-        accurate[check] = _errors(distances, parts.taken(check), at_corners[check]) <= (
-            ERROR * clearance
-        )
-        accurate |= longest <= FINEST * clearance
-        straddles &= ~accurate
-        if not straddles.any():
-            break
-        before = parts
-        parts, vertices = _bisected(parts, vertices, lengths, straddles, fixed)
-        count = len(before.faces)
-        accurate &= (parts.faces[:count] == before.faces).all(axis=1)
-        accurate = np.append(accurate, np.zeros(len(parts.faces) - count, dtype=bool))
-        unknown = np.full(len(vertices) - len(values), np.nan)
-        values = _evaluated(distances, parts, np.append(values, unknown))
-        fixed = np.append(fixed, np.zeros(len(vertices) - len(fixed), dtype=bool))
-    parts, vertices = _kept(parts, vertices, values - level, SNAP * clearance)
+    level = LEVEL * clearance
+    refined = nicmm_kernels.refine_at_level(
+        distances.paths,
+        nicmm_kernels.PartArrays(
+            np.ascontiguousarray(parts.faces),
+            opposite_sides(parts.faces).astype(np.int64),
+            np.ascontiguousarray(parts.parent),
+            np.ascontiguousarray(parts.corners),
+            np.ascontiguousarray(vertices),
+            _distances_of_vertices(distances, parts, len(vertices)),
+            fixed,
+        ),
+        reached,
+        nicmm_kernels.LevelLimits(
+            level, clearance, COARSEST * clearance, FINEST * clearance, ERROR * clearance
+        ),
+        checkpoint,
+    )
+    parts = FaceParts(refined.faces, refined.parents, refined.corners)
+    values = refined.distances - level
+    parts, vertices = _kept(parts, refined.vertices, values, SNAP * clearance)
     return others.joined(parts), vertices
 
 
-def _evaluated(distances: SegmentDistances, parts: FaceParts, values: FloatArray) -> FloatArray:
-    """Distances of the vertices of parts; those that are not NaN stay."""
-    unknown = np.isnan(values[parts.faces])
-    vertex, first = np.unique(parts.faces[unknown], return_index=True)
-    row, corner = (index[first] for index in np.nonzero(unknown))
-    points = SurfacePoints(parts.parent[row], parts.corners[row, corner])
-    values = values.copy()
-    values[vertex] = distances.at(points)
-    return values
-
-
-def _errors(distances: SegmentDistances, parts: FaceParts, at_corners: FloatArray) -> FloatArray:
-    """Greatest error of linear interpolation at the centroid and in the middle of sides, (f,)."""
-    shares = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [1 / 3, 1 / 3, 1 / 3]])
-    weights = np.einsum("pc,fcd->fpd", shares, parts.corners).reshape(-1, 3)
-    points = SurfacePoints(parts.parent.repeat(len(shares)), weights)
-    exact = distances.at(points).reshape(-1, len(shares))
-    return np.abs(at_corners @ shares.T - exact).max(axis=1)
+def _distances_of_vertices(distances: SegmentDistances, parts: FaceParts, count: int) -> FloatArray:
+    """Distances of the vertices of parts, (count,); infinite for other vertices."""
+    vertex, first = np.unique(parts.faces, return_index=True)
+    row, corner = np.divmod(first, 3)
+    found = np.full(count, np.inf)
+    found[vertex] = distances.at(SurfacePoints(parts.parent[row], parts.corners[row, corner]))
+    return found
 
 
 def _side_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Length of the side opposite each corner, (f, 3)."""
     sides = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     return edge_lengths(vertices, sides).reshape(-1, 3)
-
-
-def _bisected(
-    parts: FaceParts, vertices: FloatArray, lengths: FloatArray, which: BoolArray, fixed: BoolArray
-) -> tuple[FaceParts, FloatArray]:
-    """Bisect the longest sides of some parts, and what else keeps the mesh conforming and sound.
-
-    A part one of whose sides is bisected is also bisected at its longest side, as in Rivara
-    ("Algorithms for refining triangular grids", 1984). Sides between two fixed vertices stay.
-    """
-    size = len(vertices)
-    sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
-    keys, edge = np.unique(edge_keys(sides[..., 0], sides[..., 1], size), return_inverse=True)
-    edge = edge.reshape(-1, 3)
-    free = ~fixed[sides].all(axis=2)
-    # Of sides of equal length, the one with the greatest key counts as the longest in every part.
-    order = np.lexsort([edge, np.where(free, lengths, -1.0)], axis=1)
-    longest = np.take_along_axis(edge, order[:, -1:], axis=1)[:, 0]
-    possible = free.any(axis=1)
-    is_marked = np.zeros(len(keys), dtype=bool)
-    is_marked[longest[which & possible]] = True
-    while True:
-        touched = is_marked[edge].any(axis=1) & possible
-        if is_marked[longest[touched]].all():
-            break
-        is_marked[longest[touched]] = True
-    marked = keys[is_marked]
-    ends = np.stack(np.divmod(marked, size), axis=1)
-    middle = size + np.arange(len(marked))
-    return _divided(parts, vertices, ends, middle, np.full(len(marked), 0.5))
 
 
 def _divided(

@@ -15,6 +15,7 @@ from nicmm_kernels import KernelError
 
 import build
 from nicmm_core import shapes
+from nicmm_core.geometry.mesh import opposite_sides
 from tests.core.checks import curve_through, points_near
 
 BALL = shapes.sphere(2)
@@ -336,6 +337,33 @@ def distances_from_segments(at_faces, at_barycentric, **given):
     return paths.sides, paths.at(at_faces, at_barycentric)
 
 
+def arguments_refinement(f=12):
+    """Arguments of `refined` for the first f faces of the ball as parts, by name."""
+    opposite = opposite_sides(BALL.faces[:f])
+    return {
+        "paths": nicmm_kernels.SegmentPaths(
+            **{k: v for k, v in arguments_segments_in_faces().items() if not k.startswith("at_")}
+        ),
+        "faces": BALL.faces[:f].copy(),
+        "opposite": opposite.astype(np.int64),
+        "parents": np.arange(f),
+        "corners": np.broadcast_to(np.eye(3), (f, 3, 3)).copy(),
+        "vertices": BALL.vertices.copy(),
+        "distances": np.linspace(0.0, 0.6, len(BALL.vertices)),
+        "fixed": np.zeros(len(BALL.vertices), dtype=bool),
+        "reached": np.ones(len(BALL.faces), dtype=bool),
+        "limits": nicmm_kernels.LevelLimits(0.3, 0.3, 0.2, 0.05, 0.01),
+        "meanwhile": nothing,
+    }
+
+
+def refined(paths, reached, limits, meanwhile, **parts):
+    """The triangles after bisection."""
+    return nicmm_kernels.refine_at_level(
+        paths, nicmm_kernels.PartArrays(**parts), reached, limits, meanwhile
+    )
+
+
 def arguments_turning(k=2, n=8):
     """Arguments of `turning_paths` with k control points among n cells, all joined, by name."""
     generator = np.random.default_rng(7)
@@ -434,6 +462,7 @@ CALLS = {
     "nearest_cells": (nicmm_kernels.nearest_cells, arguments_cells),
     "points_on_edge_paths": (nicmm_kernels.points_on_edge_paths, arguments_paths),
     "distances_from_segments": (distances_from_segments, arguments_segments_in_faces),
+    "refine_at_level": (refined, arguments_refinement),
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
     "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
@@ -461,6 +490,7 @@ FINITE = {
 """Arrays whose values have to be finite; others may have any values."""
 
 INDICES = {
+    "refine_at_level": [("faces", None), ("parents", None)],
     "distances_from_segments": [("faces", None), ("at_faces", None)],
     "trace_steps": [("places", 0), ("start", None), ("end", None)],
     "place_nodes": [("faces", None)],
@@ -484,6 +514,8 @@ INDICES = {
 """Arrays of indices."""
 
 OF_ANY_LENGTH = [
+    ("refine_at_level", "faces"),
+    ("refine_at_level", "vertices"),
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
     ("polyline_crossings", "all_faces"),
@@ -765,6 +797,42 @@ def test_neighbours_that_do_not_exist_are_refused(index, name):
     given[name][3] = index
     with pytest.raises(KernelError, match="index is out of range"):
         distances_from_segments(**given)
+
+
+def test_bisected_triangles_conform_and_cover_the_same_area():
+    given = arguments_refinement(len(BALL.faces))
+    found = refined(**given)
+    assert len(found.faces) > 2 * len(BALL.faces)
+    mesh = type(BALL)(found.vertices, found.faces)
+    np.testing.assert_array_equal(found.opposite, mesh.opposite_sides)
+    assert mesh.is_oriented and not len(mesh.unpaired_edges[0])
+    assert mesh.face_areas.sum() == pytest.approx(BALL.face_areas.sum(), rel=1e-12)
+    in_parents = np.einsum("fcd,fdk->fck", found.corners, BALL.vertices[BALL.faces[found.parents]])
+    np.testing.assert_allclose(in_parents, found.vertices[found.faces], atol=1e-14)
+    new = np.arange(len(found.vertices)) >= len(BALL.vertices)
+    row, corner = np.nonzero(new[found.faces])
+    exact = given["paths"].at(found.parents[row], found.corners[row, corner])
+    near = exact < given["limits"].level
+    assert near.sum() > 100
+    there = found.distances[found.faces[row, corner]]
+    np.testing.assert_allclose(there[near], exact[near], atol=1e-12)
+
+
+def test_bisection_in_several_calls_gives_the_same(monkeypatch):
+    whole = refined(**arguments_refinement(200))
+    monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 3)
+    pauses = []
+    parts = refined(**{**arguments_refinement(200), "meanwhile": lambda: pauses.append(None)})
+    assert len(pauses) > 20
+    for one, other in zip(whole, parts, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_side_between_fixed_vertices_is_not_bisected():
+    given = arguments_refinement(200)
+    given["fixed"][:] = True
+    found = refined(**given)
+    assert len(found.faces) == 200
 
 
 def test_windows_that_do_not_fit_get_more_room_up_to_a_limit(monkeypatch):
