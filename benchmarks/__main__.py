@@ -54,6 +54,7 @@ MEASUREMENTS = (
     "gallery",
     "obstacles",
     "several_curves",
+    "option_costs",
     "lanes",
     "sharp_edges",
     "guarantee",

@@ -74,7 +74,7 @@ def _measured(mesh: Mesh, clearance: float, generator: np.random.Generator) -> d
     for index in range(CURVES):
         closed = index % 2 == 1
         for _ in range(DRAWS):
-            points = _drawn(mesh, designs, generator)
+            points = drawn(mesh, designs, generator)
             if points is None:
                 continue
             begun = time.process_time()
@@ -106,7 +106,7 @@ def _measured(mesh: Mesh, clearance: float, generator: np.random.Generator) -> d
     }
 
 
-def _drawn(
+def drawn(
     mesh: Mesh, designs: list[nicmm.Design], generator: np.random.Generator
 ) -> IntArray | None:
     """Vertices near each other and away from earlier curves; None if there are not enough."""

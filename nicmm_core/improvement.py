@@ -43,6 +43,9 @@ WITH_NORMAL_BENDING = 8.0
 The fairest curve then bends more along the surface in order to bend less with it.
 """
 
+WITH_AVOIDED_CURVES = 2.5
+"""Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
+
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
@@ -317,8 +320,9 @@ class Improvement:
         return self._is_kinked and self._is_affordable(self._work_of_search + mean)
 
     def _bound(self, bending: float) -> float:
-        """A bound of the bending, with regard to the weight of the normal bending."""
-        return bending * (1.0 + WITH_NORMAL_BENDING * self.request.normal_bending)
+        """A bound of the bending, with regard to other options that make the curve bend."""
+        of_normal_bending = 1.0 + WITH_NORMAL_BENDING * self.request.normal_bending
+        return bending * of_normal_bending * (WITH_AVOIDED_CURVES if self.request.avoid else 1.0)
 
     def _limited(self, config: RelaxationConfig) -> RelaxationConfig:
         """Settings with which another relaxation does at most the work that is left."""
