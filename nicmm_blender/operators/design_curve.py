@@ -133,6 +133,7 @@ class NICMM_OT_design_curve(
                 request.settings,
                 design_request.corners_of(request, each),
                 request.via,
+                request.others,
             )
             for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]

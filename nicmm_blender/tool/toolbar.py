@@ -83,7 +83,7 @@ class _SurfaceCurve:
             choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
-        for name in ("closed", "smoothness", "normal_bending"):
+        for name in ("closed", "smoothness", "normal_bending", "avoid_others"):
             layout.prop(properties, name)
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:
