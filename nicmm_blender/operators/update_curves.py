@@ -84,7 +84,8 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
             try:
                 updated = named(name)
                 writing.replace(updated, request, answer)
-                self.changed_curves = (*self.changed_curves, updated.session_uid)
+                if self.curve:  # otherwise all curves are updated anyway
+                    self.changed_curves = (updated.session_uid,)
             except InputError as error:
                 self._failed.append((name, str(error)))
         remarks = [f'"{name}": {message}' for name, message in self._failed]

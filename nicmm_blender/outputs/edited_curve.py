@@ -294,6 +294,7 @@ def _record(
     curves: list[SurfaceCurve],
     drawn: Drawn | None,
 ) -> None:
+    points = snapped(edited, points)
     curve_settings = replace(edited.settings, method="ELASTIC")
     via = edited.via.fitting(len(points), curve_settings.closed)
     curve_record.write_record(

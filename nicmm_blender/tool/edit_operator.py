@@ -148,7 +148,6 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             positions = np.array([point.position[:] for point in self.points])
             places = edited_curve.surface_points_at(opened, positions, "points")
             points = ControlPoints(places, np.zeros(len(places), dtype=bool))
-            points = edited_curve.snapped(opened, points)
             opened = replace(opened, points=points, via=no_via_points())
         elif edited is None:
             raise InputError(
