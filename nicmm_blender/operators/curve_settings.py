@@ -227,8 +227,9 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
-    for name in ("closed", "smoothness", "normal_bending", "avoid_others"):
+    for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
+    layout.prop(values, "avoid_others", text="Avoid Others")  # the header is narrow
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")

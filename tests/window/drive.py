@@ -30,8 +30,8 @@ DRAGGED, JUMPING = 3, 1
 SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))
 """Sideways and backwards on the crown of Suzanne's head; with three corners, a shield."""
 
-FOREHEAD, ABOVE = ((-0.42, 0.55), (0.0, 0.62), (0.42, 0.55)), ((-0.4, 0.72), (0.0, 0.78))
-"""In front of Suzanne's head: a curve across the forehead, and the beginning of one above it."""
+ACROSS, BEHIND = ((-0.45, -0.05), (0.0, 0.0), (0.45, -0.05)), ((-0.42, 0.45), (0.0, 0.5))
+"""Sideways and backwards on the crown: a curve across it, and the beginning of one behind it."""
 
 SMOOTHNESS = (150, 68)
 """Pixel of the field in the header."""
@@ -813,24 +813,24 @@ def begin_choice(blender: Blender) -> None:
 
 def several(blender: Blender) -> None:
     """A curve that avoids another one, ends on it, and follows it."""
-    step("A curve across the forehead")
+    step("A curve across the crown")
     blender.do("helper.suzanne()")
-    blender.do("helper.look()")
+    blender.do("helper.look(0.05, -0.15, 1.0, 3.0)")
     choose_tool(blender)
     blender.do("bpy.context.scene.nicmm_curves.closed = False")
-    click_places(blender, blender.do(f"value = helper.in_front({FOREHEAD})"))
+    click_places(blender, blender.do(f"value = helper.from_above({ACROSS})"))
     blender.do("helper.curve().name = 'First'")
-    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    beside = (150, 650)
     blender.move(beside)
     blender.key("Return")
     blender.wait("helper.curve() is None", "the end")
-    step("A second one above it; a click on the first one makes a junction")
+    step("A second one behind it; a click on the first one makes a junction")
     blender.do(
         "panel = bpy.context.scene.nicmm_curves\n"
         "panel.avoid_others, panel.clearance = True, 0.1\n"
         'bpy.ops.ed.undo_push(message="Settings")'
     )
-    click_places(blender, blender.do(f"value = helper.in_front({ABOVE})"))
+    click_places(blender, blender.do(f"value = helper.from_above({BEHIND})"))
     blender.do("helper.curve().name = 'Second'")
     (pixel,) = blender.do("value = helper.pixels(helper.middle_of_other('First', 1))")
     blender.move((pixel[0] + 3, pixel[1] + 3))  # near the curve, not exactly on it
@@ -852,7 +852,7 @@ def drag_first(blender: Blender, beside) -> None:
     blender.do('bpy.ops.ed.undo_push(message="Activate")')
     before = state(blender)
     second = blender.do("value = helper.points_of('Second')")
-    drag(blender, pixel_of(blender, 1), 20, (0.0, -2.0), "20-first-dragged")
+    drag(blender, pixel_of(blender, 1), 20, (0.0, -2.5), "20-first-dragged")
     check(blender.do("value = helper.points_of('Second')") == second, "it waits for the release")
     blender.mouse("mouseup", 1)
     blender.wait("not helper.is_modal()", "the end of the drag")
@@ -934,7 +934,7 @@ def large(blender: Blender) -> None:
 
     step("2M quads: the first click beside the mesh prepares it and ends")
     blender.do("helper.suzanne(6)\nhelper.forget()")
-    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    beside = (150, 650)
     time.sleep(10.0)
     blender.click(beside)
     blender.wait("helper.is_in_time_slices()", "the preparation of the mesh")
