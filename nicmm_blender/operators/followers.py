@@ -88,12 +88,18 @@ def write(requests: Sequence[DesignRequest], answers: Sequence[Answer]) -> list[
         if curve_object is None:
             continue
         try:
-            if number >= len(answers):
+            if number >= len(answers) or _is_cancelled(answers[number]):
                 raise InputError("It was cancelled. Run Update Curves")
             writing.replace(curve_object, request, answers[number])
         except (InputError, nicmm.NicmmError) as error:
             remarks.append(_remark(curve_object, error))
     return remarks
+
+
+def _is_cancelled(answer: Answer) -> bool:
+    from ... import nicmm_core as nicmm
+
+    return isinstance(answer, nicmm.Design) and answer.status is nicmm.Status.CANCELLED
 
 
 def follow_now(context: bpy.types.Context, changed: Collection[bpy.types.Object]) -> list[str]:

@@ -76,8 +76,8 @@ def _other(curve_object: bpy.types.Object, surface: Surface) -> OtherCurve:
         if uses != surface.with_modifiers:
             raise InputError(
                 f'"{name}", which is to be avoided, lies on another surface: Use Modifiers is '
-                f"{'on' if uses else 'off'} there. Set it alike for both curves, or move the "
-                "curve above it"
+                f"{'on' if uses else 'off'} there. Set it alike for both curves, or move this "
+                "curve above that one in the list"
             )
         return OtherCurve(uid, name, tuple(curve_record.read_curves(curve_object, surface)))
     except InputError as error:

@@ -3,6 +3,8 @@
 Junctions are tested in test_junctions.py.
 """
 
+from importlib import import_module
+
 import bpy
 import numpy as np
 import pytest
@@ -13,9 +15,12 @@ from tests.blender import scenes
 from tests.blender.scenes import module
 from tests.blender.test_curve_list import run_timer
 from tests.blender.test_point_operators import call, controls, refusal
+from tests.blender.test_time_slices import Window, no_patience
 from tests.oracles.curve_pairs import contacts
 
 pytestmark = [pytest.mark.usefixtures("remembered_designs")]
+
+__all__ = ["no_patience"]  # a fixture
 
 CLEARANCE = 0.1
 LEAST = 0.975
@@ -401,6 +406,76 @@ class TestFollowing:
         scenes.activate(pair)
         assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
         assert is_current(empty_scene, "First") and is_current(empty_scene, "Second")
+
+
+class TestInTheWindow:
+    """Long work continues in time slices: first the changed curve, then those that follow."""
+
+    @pytest.fixture
+    def moving(self, empty_scene, pair, no_patience, monkeypatch):
+        """A window with an operator that moves a point of the first curve."""
+        request = module(empty_scene, "scene.design_request")
+        cancelled = import_module(f"{empty_scene.core.__name__}.design_result").cancelled_design
+        plain = request.answer
+
+        def answer(asked, progress):
+            """Takes at least two time slices, also for a design that is remembered."""
+            if progress(0.0, np.zeros((0, 3))) is False:
+                return cancelled(0.0)
+            return plain(asked, progress)
+
+        monkeypatch.setattr(request, "answer", answer)
+        changes = module(empty_scene, "tool.changes_points")
+        edited_curve = module(empty_scene, "outputs.edited_curve")
+
+        class Moving(changes.ChangesPoints):
+            curve, index, from_mouse = "First", 2, False
+            position = on(pair, around(0.06))[2]
+
+            def changed(self, opened):
+                place = self.place(opened)
+                return edited_curve.with_point(opened.points, self.index, place, replaced=True)
+
+        window = Window(Moving)
+        for name in ("scene", "view_layer", "active_object", "selected_objects"):
+            setattr(window.context, name, getattr(bpy.context, name))
+        operator, context = window.operator, window.context
+        assert operator.answer(context, operator.requests(context)) == {"RUNNING_MODAL"}
+        return window
+
+    def test_the_others_follow_in_time_slices(self, empty_scene, pair, moving):
+        before = {name: points_of(empty_scene, name) for name in ("First", "Second")}
+        assert moving.finish() == {"RUNNING_MODAL"}  # now the second curve
+        assert len(moving.handlers) == len(moving.timers) == 1
+        assert not np.array_equal(points_of(empty_scene, "First"), before["First"])
+        np.testing.assert_array_equal(points_of(empty_scene, "Second"), before["Second"])
+        assert moving.finish() == {"FINISHED"}
+        assert is_current(empty_scene, "Second")
+        assert_apart(empty_scene, pair, ["First", "Second"])
+        assert not moving.timers and moving.texts[-1] is None
+        assert not moving.reports and not vars(moving.operator)
+
+    def test_escape_changes_nothing_at_first(self, empty_scene, moving):
+        before = {name: points_of(empty_scene, name) for name in ("First", "Second")}
+        assert moving.send("ESC", "PRESS") == {"CANCELLED"}
+        for name, points in before.items():
+            np.testing.assert_array_equal(points_of(empty_scene, name), points)
+
+    def test_escape_leaves_what_has_not_followed(self, empty_scene, pair, moving):
+        """The operator ends with an undo step, since the first curve has changed."""
+        before = {name: points_of(empty_scene, name) for name in ("First", "Second")}
+        assert moving.finish() == {"RUNNING_MODAL"}
+        assert moving.send("ESC", "PRESS") == {"FINISHED"}
+        assert not np.array_equal(points_of(empty_scene, "First"), before["First"])
+        np.testing.assert_array_equal(points_of(empty_scene, "Second"), before["Second"])
+        ((kind, message),) = moving.reports
+        assert kind == {"WARNING"}
+        assert message == '"Second" keeps its shape: It was cancelled. Run Update Curves'
+        assert not moving.timers and not vars(moving.operator)
+        assert not is_current(empty_scene, "Second")
+        scenes.activate(pair)
+        bpy.ops.nicmm.update_curves()
+        assert is_current(empty_scene, "Second")
 
 
 class TestLive:
