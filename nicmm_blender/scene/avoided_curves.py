@@ -26,7 +26,8 @@ def above(
 ) -> tuple[OtherCurve, ...]:
     """The curves that a curve with some settings avoids, as they are now.
 
-    Drawings that have no curve yet are left out.
+    Drawings that have no curve yet are left out, and exact copies of the curve: a duplicate is
+    avoided only after it, or its original, has been changed.
 
     Parameters
     ----------
@@ -44,8 +45,12 @@ def above(
     curves = curve_record.designed_on(mesh_object)
     if curve_object in curves:
         curves = curves[: curves.index(curve_object)]
-    found = (_other(each, surface) for each in curves if not curve_record.is_unfinished(each))
-    return tuple(found)
+    return tuple(
+        _other(each, surface)
+        for each in curves
+        if not curve_record.is_unfinished(each)
+        and (curve_object is None or not curve_record.have_same_points(each, curve_object))
+    )
 
 
 def from_first_of(changed: Collection[bpy.types.Object]) -> list[bpy.types.Object]:

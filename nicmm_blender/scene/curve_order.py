@@ -52,3 +52,10 @@ def new_ranks(curves: Sequence[bpy.types.Object]) -> dict[bpy.types.Object, int]
 def set_rank(curve_object: bpy.types.Object, rank: int) -> None:
     """Give a curve a rank."""
     curve_object[RECORD_KEY][RANK] = rank
+
+
+def reverse(curves: Sequence[bpy.types.Object]) -> None:
+    """Reverse the order of curves of different rank."""
+    ranks = [rank_of(each) for each in curves]
+    for each, rank in zip(curves, reversed(ranks), strict=True):
+        set_rank(each, rank)

@@ -362,6 +362,15 @@ def has_curve(curve_object: bpy.types.Object) -> bool:
     return number_of_curves(curve_object) > 0
 
 
+def have_same_points(one: bpy.types.Object, other: bpy.types.Object) -> bool:
+    """Whether two objects have records of the same curve, as after duplicating one of them."""
+    first, second = one[RECORD_KEY], other[RECORD_KEY]
+    return all(
+        np.array_equal(np.asarray(first.get(name, ())), np.asarray(second.get(name, ())))
+        for name in ("corners", "barycentric")
+    )
+
+
 def is_unfinished(curve_object: bpy.types.Object) -> bool:
     """Whether a drawing has too few points for a curve; False if its record is damaged."""
     try:

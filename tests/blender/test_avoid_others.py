@@ -551,6 +551,16 @@ class TestRecords:
         assert is_current(empty_scene, "Second")
         assert_apart(empty_scene, pair, ["First", "Second"])
 
+    def test_a_duplicate_of_a_curve_that_avoids_is_left_alone(self, empty_scene, pair):
+        """It would have to avoid its original, on which it lies."""
+        scenes.activate(bpy.data.objects["Second"])
+        bpy.ops.object.duplicate()
+        assert order(empty_scene, pair) == ["First", "Second", "Second.001"]
+        assert is_current(empty_scene, "Second.001")
+        scenes.activate(bpy.data.objects["Second"])
+        bpy.ops.nicmm.convert_curve(output="STICKY", keep_original=True)
+        assert is_current(empty_scene, order(empty_scene, pair)[-1])
+
     def test_the_name_of_the_curve_above_does_not_matter(self, empty_scene, pair):
         bpy.data.objects["First"].name = "Renamed"
         assert is_current(empty_scene, "Second")
@@ -617,6 +627,20 @@ class TestMessages:
         scenes.select(sphere, scenes.ring(sphere, 4, 0.0))
         made = bpy.ops.nicmm.design_curve(method="VARIATIONAL", avoid_others=True, clearance=0.1)
         assert made == {"FINISHED"}
+
+    @pytest.mark.slow
+    def test_alternatives_come_after_the_fairest_curve(self, empty_scene, sphere):
+        draw(sphere, around(0.0), "First")
+        scenes.activate(sphere)
+        places = on(sphere, ring([0.0, 180.0], [0.35, 0.3]))
+        points = ", ".join(" ".join(map(str, place)) for place in places)
+        bpy.ops.nicmm.design_curve(points=points, closed=False, avoid_others=True, alternatives=2)
+        names = order(empty_scene, sphere)
+        assert len(names) > 2 and names[0] == "First"
+        assert names[1] == bpy.context.active_object.name
+        settings = [bpy.data.objects[name].nicmm_settings for name in names[1:]]
+        assert [each.avoid_others for each in settings] == [True] + [False] * (len(names) - 2)
+        assert all(is_current(empty_scene, name) for name in names)
 
     def test_design_curve_avoids(self, empty_scene, sphere):
         draw(sphere, around(0.0), "First")
