@@ -90,6 +90,7 @@ def write(requests: Sequence[DesignRequest], answers: Sequence[Answer]) -> list[
         try:
             if number >= len(answers) or _is_cancelled(answers[number]):
                 raise InputError("It was cancelled. Run Update Curves")
+            request.check_unchanged()
             writing.replace(curve_object, request, answers[number])
         except (InputError, nicmm.NicmmError) as error:
             remarks.append(_remark(curve_object, error))

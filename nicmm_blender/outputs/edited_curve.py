@@ -230,6 +230,12 @@ def open_curve(
     )
 
 
+def is_current(curve_object: bpy.types.Object, opened: Opened) -> bool:
+    """Whether an opened curve was designed on its surface as it is, with its present settings."""
+    now = curve_record.digest(opened.mesh_object, opened.surface, opened.settings, opened.others)
+    return curve_record.is_current(curve_object, now)
+
+
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:

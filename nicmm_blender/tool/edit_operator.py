@@ -159,7 +159,8 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             points = replace(points, corners=selection.given_corners(self.corners, len(points)))
         if len(self.via_points):  # they select the course, so it is searched for
             opened = replace(opened, via=self._given_via_points(opened), curve=None)
-        if len(self.points) or changes_corners or opened.curve is None:
+        is_outdated = edited is not None and not edited_curve.is_current(edited, opened)
+        if len(self.points) or changes_corners or is_outdated or opened.curve is None:
             curves = _design_curves(context, opened, points)
         else:
             curves = [opened.curve]

@@ -379,6 +379,15 @@ class TestFollowing:
         first.nicmm_settings.closed = True
         assert not settings.problem_of(first)
 
+    def test_edit_curve_designs_an_outdated_curve_again(self, empty_scene, pair):
+        before = points_of(empty_scene, "Second")
+        scenes.activate(bpy.data.objects["First"])
+        bpy.ops.object.delete()
+        scenes.activate(pair)
+        bpy.ops.nicmm.edit_curve("EXEC_DEFAULT", True, curve="Second")
+        assert is_current(empty_scene, "Second")
+        assert points_of(empty_scene, "Second")[:, 2].min() < before[:, 2].min() - 0.05
+
     def test_an_update_of_one_takes_those_below_along(self, empty_scene, pair):
         pair.data.vertices[0].co *= 1.01
         pair.data.update()

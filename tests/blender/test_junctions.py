@@ -22,6 +22,7 @@ from tests.blender.test_avoid_others import (
 )
 from tests.blender.test_curve_list import run_timer
 from tests.blender.test_point_operators import call, controls, refusal
+from tests.blender.test_view import matrices
 from tests.oracles.curve_pairs import contacts
 
 pytestmark = [pytest.mark.usefixtures("remembered_designs")]
@@ -374,3 +375,72 @@ def test_a_junction_without_its_curve_is_an_ordinary_point(empty_scene, tee):
     call("move_point", curve="Second", index=1, position=on(tee, ring([140.0], [0.7]))[0])
     np.testing.assert_array_equal(controls(bpy.data.objects["Second"])[0], before[0])
     assert len(junctions("Second")) == 1  # it still lies on the curve
+
+
+class TestUnderTheMouse:
+    """The mouse near a curve that the active one avoids; the view is from the front, y < 0."""
+
+    @pytest.fixture
+    def picking(self, empty_scene, first, monkeypatch):
+        picking = module(empty_scene, "tool.picking")
+        view = module(empty_scene, "tool.view").View
+        cache = module(empty_scene, "scene.surface_cache")
+
+        def seen_from_the_front(_context, _mesh_object, surface):
+            size = np.array([800.0, 600.0])
+            return view(matrices(-5.0, True), size, surface, cache.core_mesh(surface), True)
+
+        monkeypatch.setattr(picking, "view_on", seen_from_the_front)
+        places = ring([255.0, 285.0], [0.3, 0.3])
+        draw(first, places, "Second", closed=False, avoid_others=True, clearance=0.05)
+        return picking
+
+    def pixel_of(self, picking, position):
+        surface = picking.opened_now(bpy.context).surface
+        return picking.view_on(bpy.context, None, surface).project(np.atleast_2d(position))[0]
+
+    def near(self, picking, position):
+        """A pixel within reach of a position."""
+        reach = picking.CURVE_REACH * bpy.context.preferences.system.ui_scale
+        return self.pixel_of(picking, position) + [0.4 * reach, 0.5 * reach]
+
+    def test_a_click_snaps_to_it(self, empty_scene, picking):
+        position = np.array(place_on(empty_scene, "First", 3, 0.1))
+        hit = picking.under_mouse(bpy.context, self.near(picking, position))
+        assert (hit.kind, hit.name, hit.index) == (picking.Kind.JUNCTION, "Second", 2)
+        assert np.linalg.norm(hit.position - position) < 0.02
+        call("add_point", position=hit.position)
+        assert [each[:2] for each in junctions("Second")] == [(2, "First")]
+        assert_on(empty_scene, "Second", 2)
+
+    def test_it_prefers_control_points(self, empty_scene, picking):
+        place = controls(bpy.data.objects["First"])[3]
+        hit = picking.under_mouse(bpy.context, self.near(picking, place))
+        assert hit.kind is picking.Kind.JUNCTION
+        np.testing.assert_allclose(hit.position, place, atol=1e-12)
+
+    def test_farther_away_it_is_the_surface(self, empty_scene, picking):
+        pixel = self.pixel_of(picking, place_on(empty_scene, "First", 3, 0.1))
+        hit = picking.under_mouse(bpy.context, pixel - [0.0, 40.0])
+        assert hit.kind is picking.Kind.SURFACE
+
+    def test_otherwise_a_click_activates_it(self, empty_scene, picking, first):
+        pixel = self.pixel_of(picking, place_on(empty_scene, "First", 3, 0.1))
+        bpy.data.objects["Second"].nicmm_settings.avoid_others = False
+        hit = picking.under_mouse(bpy.context, pixel)
+        assert (hit.kind, hit.name) == (picking.Kind.CURVE, "First")
+        bpy.context.scene.nicmm_curves.avoid_others = True
+        scenes.activate(first)
+        hit = picking.under_mouse(bpy.context, pixel)
+        assert (hit.kind, hit.name) == (picking.Kind.CURVE, "First")
+
+    def test_a_hidden_curve_attracts_nothing(self, empty_scene, picking):
+        pixel = self.pixel_of(picking, place_on(empty_scene, "First", 3, 0.1))
+        bpy.data.objects["First"].hide_set(True)
+        hit = picking.under_mouse(bpy.context, pixel)
+        assert hit.kind is picking.Kind.SURFACE
+
+    def test_junctions_of_the_active_curve_are_marked(self, empty_scene, picking):
+        assert not picking.opened_now(bpy.context).junctions.any()
+        call("move_point", index=1, position=place_on(empty_scene, "First", 3, 0.1))
+        assert picking.opened_now(bpy.context).junctions.tolist() == [False, True]
