@@ -52,13 +52,6 @@ class OtherCurve:
     curves: tuple[SurfaceCurve, ...]
     problem: str = ""
 
-    @property
-    def whole(self) -> SurfaceCurve | None:
-        """Its only curve, if that passes all control points; junctions can follow such a curve."""
-        if len(self.curves) != 1 or (self.curves[0].control_index < 0).any():
-            return None
-        return self.curves[0]
-
 
 @dataclass(frozen=True)
 class Junction:
@@ -70,6 +63,8 @@ class Junction:
         Index of the control point.
     uid : int
         The session_uid of the object of the other curve.
+    part : int
+        Index of the other curve in its object.
     leg : int
         The leg of the other curve.
     share : float
@@ -80,6 +75,7 @@ class Junction:
 
     point: int
     uid: int
+    part: int
     leg: int
     share: float
     legs: int
@@ -110,10 +106,12 @@ def followed(
         point_at,
     )
 
-    of_uid = {other.uid: other.whole for other in others}
+    curves = {
+        (other.uid, part): curve for other in others for part, curve in enumerate(other.curves)
+    }
     moved = set()
     for junction in junctions:
-        curve = of_uid.get(junction.uid)
+        curve = curves.get((junction.uid, junction.part))
         if curve is None or junction.point in moved or junction.point >= len(points):
             continue
         moved.add(junction.point)
@@ -133,7 +131,7 @@ def snapped(mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]) -> 
     from ...nicmm_core.geometry.curve_places import nearest_point
 
     placed = set()
-    for number, curve in _on_other_curves(mesh, points, others):
+    for number, _other, _part, curve in _on_other_curves(mesh, points, others):
         if number in placed:
             continue
         placed.add(number)
@@ -146,38 +144,39 @@ def snapped(mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]) -> 
 
 def _on_other_curves(
     mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]
-) -> list[tuple[int, SurfaceCurve]]:
-    """The control points within `SNAP` of other curves, with each of these curves."""
+) -> list[tuple[int, OtherCurve, int, SurfaceCurve]]:
+    """The control points within `SNAP` of other curves.
+
+    Each with the other object, and the index and the curve in that object.
+    """
     from ...nicmm_core.geometry.curve_places import distances
 
     positions = points.positions(mesh)
     return [
-        (number, curve)
+        (number, other, part, curve)
         for other in others
-        for curve in other.curves
+        for part, curve in enumerate(other.curves)
         for number in np.flatnonzero(distances(curve, positions) <= SNAP * mesh.diagonal).tolist()
     ]
 
 
 def on_curves(mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]) -> list[Junction]:
-    """The control points that lie on other curves, as junctions that can follow them."""
+    """The control points on other curves that pass all their own control points, as junctions."""
     from ...nicmm_core.geometry.curve_places import nearest_place, number_of_legs
 
     found = []
-    for other in others:
-        for number, curve in _on_other_curves(mesh, points, [other]):
-            if curve is other.whole:
-                position = points[np.array([number])].positions(mesh)[0]
-                place = nearest_place(mesh, curve, position)
-                legs = number_of_legs(curve)
-                found.append(Junction(number, other.uid, place.leg, place.share, legs))
+    for number, other, part, curve in _on_other_curves(mesh, points, others):
+        if (curve.control_index >= 0).all():
+            position = points[np.array([number])].positions(mesh)[0]
+            place, legs = nearest_place(mesh, curve, position), number_of_legs(curve)
+            found.append(Junction(number, other.uid, part, place.leg, place.share, legs))
     return found
 
 
 def are_junctions(mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]) -> np.ndarray:
     """Which control points lie on other curves, (k,)."""
     flags = np.zeros(len(points), dtype=bool)
-    flags[[number for number, _ in _on_other_curves(mesh, points, others)]] = True
+    flags[[number for number, *_ in _on_other_curves(mesh, points, others)]] = True
     return flags
 
 
@@ -187,6 +186,7 @@ def to_store(junctions: Sequence[Junction]) -> list[dict[str, Any]]:
         {
             "point": junction.point,
             "curve": curve_object,
+            "part": junction.part,
             "leg": junction.leg,
             "share": junction.share,
             "legs": junction.legs,
@@ -202,6 +202,7 @@ def of_record(record: Record) -> list[Junction]:
         Junction(
             stored["point"],
             stored["curve"].session_uid,
+            stored["part"],
             stored["leg"],
             stored["share"],
             stored["legs"],

@@ -87,10 +87,10 @@ def _check_junctions(record: Record, count: int) -> None:
     for junction in stored:
         if not is_group(junction):
             raise _DamagedError("a junction is not a group of properties")
-        values = [junction.get(name) for name in ("point", "leg", "legs")]
+        values = [junction.get(name) for name in ("point", "part", "leg", "legs")]
         if not all(isinstance(value, int) and value >= 0 for value in values):
             raise _DamagedError("a junction has no valid indices")
-        point, leg, legs = values
+        point, _part, leg, legs = values
         share = junction.get("share")
         if point >= count or leg >= legs or not _is_finite(share) or not 0.0 <= share <= 1.0:
             raise _DamagedError("a junction is at a place that does not exist")
