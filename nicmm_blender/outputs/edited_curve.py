@@ -179,8 +179,6 @@ def open_curve(
         Whether the curve keeps its course if only settings of `SAME_COURSE` differ. With any other
         change of settings it is designed from scratch, because another course may be the best one.
     """
-    from ... import nicmm_core as nicmm
-
     if edited is None:
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is None:
@@ -203,9 +201,8 @@ def open_curve(
         if edited is not None and group and group not in mesh_object.vertex_groups:
             settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
-    none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    points = ControlPoints(none, np.zeros(0, dtype=bool))
     via, curve = no_via_points(), None
+    points = ControlPoints(via.points, np.zeros(0, dtype=bool))
     if edited is not None:
         via = curve_record.current_via_points(edited, mesh_object, surface)
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
@@ -222,9 +219,7 @@ def open_curve(
     uid = 0 if edited is None else edited.session_uid
     others = avoided_curves.above(edited, mesh_object, surface, replace(settings, method="ELASTIC"))
     if edited is not None and others:
-        mesh, follows = surface_cache.core_mesh(surface), curve_record.junctions_of(edited)
-        places = junctions.followed(mesh, points.places, follows, others)
-        points = replace(points, places=places)
+        points = _with_junctions(edited, surface, points, others)
     return Opened(
         uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, others
     )
@@ -234,6 +229,17 @@ def is_current(curve_object: bpy.types.Object, opened: Opened) -> bool:
     """Whether an opened curve was designed on its surface as it is, with its present settings."""
     now = curve_record.digest(opened.mesh_object, opened.surface, opened.settings, opened.others)
     return curve_record.is_current(curve_object, now)
+
+
+def _with_junctions(
+    edited: bpy.types.Object,
+    surface: Surface,
+    points: ControlPoints,
+    others: tuple[OtherCurve, ...],
+) -> ControlPoints:
+    """Control points, with the junctions where they are now on the curves that are avoided."""
+    mesh, follows = surface_cache.core_mesh(surface), curve_record.junctions_of(edited)
+    return replace(points, places=junctions.followed(mesh, points.places, follows, others))
 
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:

@@ -176,7 +176,7 @@ def write_record(
     surface : Surface
         Its surface.
     curves : list of SurfaceCurve
-        The curves; empty for a drawing that has too few points for a curve.
+        The curves; empty for a drawing that has too few points.
     settings : CurveSettings
         Settings of the curves.
     drawn : dict or None
@@ -192,13 +192,8 @@ def write_record(
         The curves that it was designed to avoid; control points on them are junctions.
     """
     if controls is None:
-        found = [curve.control_index[curve.control_index >= 0] for curve in curves]
-        pairs = list(zip(curves, found, strict=True))
-        control_faces = np.concatenate([curve.faces[index] for curve, index in pairs])
-        control_barycentric = np.concatenate([curve.barycentric[index] for curve, index in pairs])
-    else:
-        control_faces, control_barycentric = controls.faces, controls.barycentric
-    points = _points_to_store(CONTROL, surface, control_faces, control_barycentric)
+        controls = _control_points_of(curves)
+    points = _points_to_store(CONTROL, surface, controls.faces, controls.barycentric)
     if via is not None and len(via):
         points["via_legs"] = via.legs.tolist()
         points |= _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
@@ -218,7 +213,7 @@ def write_record(
         "control_index": _flat([curve.control_index for curve in curves]),
         **points,
         "corner_points": corners.astype(int).tolist(),
-        **_junctions_to_store(surface, control_faces, control_barycentric, others),
+        **_junctions_to_store(surface, controls, others),
         "asked": asdict(settings),
         **({} if drawn is None else {"drawn": drawn}),
     }
@@ -234,15 +229,24 @@ def _rank_of(curve_object: bpy.types.Object, mesh_object: bpy.types.Object) -> i
     return curve_order.next_rank(designed_on(mesh_object))
 
 
-def _junctions_to_store(
-    surface: Surface, faces: np.ndarray, barycentric: np.ndarray, others: Sequence[OtherCurve]
-) -> dict[str, list[dict[str, Any]]]:
-    """The control points on other curves as a record stores them; nothing if there are none."""
+def _control_points_of(curves: list[SurfaceCurve]) -> SurfacePoints:
+    """The control points that curves pass, as points of the core."""
     from ... import nicmm_core as nicmm
 
+    found = [curve.control_index[curve.control_index >= 0] for curve in curves]
+    pairs = list(zip(curves, found, strict=True))
+    return nicmm.SurfacePoints(
+        np.concatenate([curve.faces[index] for curve, index in pairs]),
+        np.concatenate([curve.barycentric[index] for curve, index in pairs]),
+    )
+
+
+def _junctions_to_store(
+    surface: Surface, points: SurfacePoints, others: Sequence[OtherCurve]
+) -> dict[str, list[dict[str, Any]]]:
+    """The control points on other curves as a record stores them; nothing if there are none."""
     if not others:
         return {}
-    points = nicmm.SurfacePoints(faces, barycentric)
     found = junctions.on_curves(surface_cache.core_mesh(surface), points, others)
     return {"junctions": junctions.to_store(found)} if found else {}
 
