@@ -6,7 +6,7 @@ from bpy.props import BoolProperty
 
 from .. import settings
 from ..outputs import curve_object, tube_radius, writing
-from ..scene import curve_record, mesh_data
+from ..scene import avoided_curves, curve_record, mesh_data
 from ..scene.messages import InputError
 from . import polls
 from .error_reports import with_error_reports
@@ -71,11 +71,14 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
             self._take_appearance(original, mesh_object)
         corners = curve_record.corners_of(original)
         via = curve_record.current_via_points(original, mesh_object, surface)
+        others = avoided_curves.above(original, mesh_object, surface, curve_settings)
         summary = writing.apply(
-            context, mesh_object, surface, curves, self, curve_settings, corners, via
+            context, mesh_object, surface, curves, self, curve_settings, corners, via, others
         )
         if is_separate:
             converted = context.active_object
+            if not self.keep_original:
+                curve_record.take_place_of(converted, original)
             for material in original.data.materials:
                 converted.data.materials.append(material)
         if not self.keep_original:

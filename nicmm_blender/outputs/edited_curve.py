@@ -7,16 +7,26 @@ An opened curve holds no references to Blender objects, since undo replaces them
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_OPEN
-from ..scene import curve_record, design_request, mesh_data, point_lists, surface_cache
+from ..scene import (
+    avoided_curves,
+    curve_record,
+    design_request,
+    junctions,
+    mesh_data,
+    point_lists,
+    surface_cache,
+)
 from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
+from ..scene.junctions import OtherCurve
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
@@ -57,6 +67,8 @@ class Opened:
         The recorded curve; None if the curve is new or has to be designed again.
     remark : str
         Text that is appended to reports; may be empty.
+    others : tuple of OtherCurve
+        The curves that it avoids.
     """
 
     curve_uid: int
@@ -67,6 +79,7 @@ class Opened:
     via: ViaPoints
     curve: SurfaceCurve | None
     remark: str
+    others: tuple[OtherCurve, ...] = ()
 
     @property
     def mesh_object(self) -> bpy.types.Object:
@@ -80,6 +93,14 @@ class Opened:
     def curve_object(self) -> bpy.types.Object | None:
         """The curve object; None for a new curve."""
         return by_uid(self.curve_uid) if self.curve_uid else None
+
+    @cached_property
+    def junctions(self) -> np.ndarray:
+        """Whether each control point lies on a curve that is avoided, (k,)."""
+        if not self.others or not len(self.points):
+            return np.zeros(len(self.points), dtype=bool)
+        mesh = surface_cache.core_mesh(self.surface)
+        return junctions.are_junctions(mesh, self.points.places, self.others)
 
     def positions(self) -> np.ndarray:
         """Positions of the control points in the object's local space, (k, 3)."""
@@ -158,8 +179,6 @@ def open_curve(
         Whether the curve keeps its course if only settings of `SAME_COURSE` differ. With any other
         change of settings it is designed from scratch, because another course may be the best one.
     """
-    from ... import nicmm_core as nicmm
-
     if edited is None:
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is None:
@@ -182,9 +201,8 @@ def open_curve(
         if edited is not None and group and group not in mesh_object.vertex_groups:
             settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
-    none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    points = ControlPoints(none, np.zeros(0, dtype=bool))
     via, curve = no_via_points(), None
+    points = ControlPoints(via.points, np.zeros(0, dtype=bool))
     if edited is not None:
         via = curve_record.current_via_points(edited, mesh_object, surface)
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
@@ -199,7 +217,29 @@ def open_curve(
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
-    return Opened(uid, mesh_object.session_uid, surface, settings, points, via, curve, remark)
+    others = avoided_curves.above(edited, mesh_object, surface, replace(settings, method="ELASTIC"))
+    if edited is not None and others:
+        points = _with_junctions(edited, surface, points, others)
+    return Opened(
+        uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, others
+    )
+
+
+def is_current(curve_object: bpy.types.Object, opened: Opened) -> bool:
+    """Whether an opened curve was designed on its surface as it is, with its present settings."""
+    now = curve_record.digest(opened.mesh_object, opened.surface, opened.settings, opened.others)
+    return curve_record.is_current(curve_object, now)
+
+
+def _with_junctions(
+    edited: bpy.types.Object,
+    surface: Surface,
+    points: ControlPoints,
+    others: tuple[OtherCurve, ...],
+) -> ControlPoints:
+    """Control points, with the junctions where they are now on the curves that are avoided."""
+    mesh, follows = surface_cache.core_mesh(surface), curve_record.junctions_of(edited)
+    return replace(points, places=junctions.followed(mesh, points.places, follows, others))
 
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
@@ -208,7 +248,7 @@ def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
         return []
     settings = replace(edited.settings, method="ELASTIC")
     found = design_request.for_drawing(
-        edited.mesh_object, edited.surface, points, edited.via, settings
+        edited.mesh_object, edited.surface, points, edited.via, settings, edited.curve_object
     )
     return [replace(found, start=edited.curve)]
 
@@ -266,6 +306,7 @@ def _record(
     curves: list[SurfaceCurve],
     drawn: Drawn | None,
 ) -> None:
+    points = snapped(edited, points)
     curve_settings = replace(edited.settings, method="ELASTIC")
     via = edited.via.fitting(len(points), curve_settings.closed)
     curve_record.write_record(
@@ -278,6 +319,7 @@ def _record(
         points.corners,
         points.places,
         via,
+        edited.others,
     )
 
 
@@ -338,6 +380,14 @@ def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> Vi
         along = _along_leg(edited, leg, via.points[divided])
         is_behind[divided] = along >= _along_leg(edited, leg, place)
     return via.after_insertion(number, count, closed, is_behind)
+
+
+def snapped(edited: Opened, points: ControlPoints) -> ControlPoints:
+    """Points, of which those that nearly lie on an avoided curve are put exactly onto it."""
+    if not edited.others or not len(points):
+        return points
+    mesh = surface_cache.core_mesh(edited.surface)
+    return replace(points, places=junctions.snapped(mesh, points.places, edited.others))
 
 
 def checked_leg(edited: Opened, leg: int) -> int:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +15,7 @@ import bmesh
 from ..scene import curve_record
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest, corners_of
+from ..scene.junctions import OtherCurve
 from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.surface import Surface
 from ..scene.via_points import ViaPoints
@@ -85,17 +87,27 @@ def apply(
     curve_settings: CurveSettings,
     corners: np.ndarray,
     via: ViaPoints | None = None,
+    others: Sequence[OtherCurve] = (),
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
     `settings` holds the output settings, `curve_settings` the settings of the curves, `corners`,
-    (k,), tells which of their control points are corners, and `via` are their via points.
+    (k,), tells which of their control points are corners, `via` are their via points, and `others`
+    the curves that they avoid.
     """
     if settings.output in SEPARATE:
         new_object = as_object(mesh_object, surface, curves, settings, corners)
         drawn = drawn_as(settings)
         curve_record.write_record(
-            new_object, mesh_object, surface, curves, curve_settings, drawn, corners, via=via
+            new_object,
+            mesh_object,
+            surface,
+            curves,
+            curve_settings,
+            drawn,
+            corners,
+            via=via,
+            others=others,
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
@@ -235,6 +247,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         curve_record.drawn_as(designed),
         corners,
         via=request.via,
+        others=request.others,
     )
 
 

@@ -36,6 +36,9 @@ class ChangesPoints(LongSolves):
     searches_course = False
     """Whether the change selects a course, which is searched for; otherwise the curve keeps its."""
 
+    snaps = True
+    """Whether a dragged point snaps to curves that the curve avoids."""
+
     curve: str
     index: int
     position: Sequence[float]
@@ -58,7 +61,8 @@ class ChangesPoints(LongSolves):
         """The curve after the change, before it is designed."""
         curve = None if self.searches_course else opened.curve
         via = self.changed_via(opened)
-        return replace(opened, points=self.changed(opened), via=via, curve=curve)
+        points = edited_curve.snapped(opened, self.changed(opened))
+        return replace(opened, points=points, via=via, curve=curve)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -84,6 +88,7 @@ class ChangesPoints(LongSolves):
         edited = self._edited
         result = edited_curve.write(context, edited, edited.points, curves, _Output(panel))
         modes.make_active(context, result)
+        self.changed_curves = (result.session_uid,)
         if edited.remark:
             count = len(edited.points)
             self.report({"WARNING"}, f'"{result.name}" through {count} points{edited.remark}')

@@ -9,8 +9,9 @@ import numpy as np
 
 from .. import settings
 from ..operators import polls
+from ..operators.answers import answer_now
 from ..operators.error_reports import with_error_reports
-from ..operators.long_solves import answer_now
+from ..operators.followers import follow_now
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, selection
@@ -108,6 +109,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             layout.prop(self, name)
         for name in edited_curve.MAPS:
             layout.prop_search(self, name, mesh_object, "vertex_groups")
+        layout.prop(self, "avoid_others")
         layout.prop(self, "clearance")
         if not self.curve:
             for name in ("output", *OBJECT_SETTINGS):
@@ -157,13 +159,16 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             points = replace(points, corners=selection.given_corners(self.corners, len(points)))
         if len(self.via_points):  # they select the course, so it is searched for
             opened = replace(opened, via=self._given_via_points(opened), curve=None)
-        if len(self.points) or changes_corners or opened.curve is None:
+        is_outdated = edited is not None and not edited_curve.is_current(edited, opened)
+        if len(self.points) or changes_corners or is_outdated or opened.curve is None:
             curves = _design_curves(context, opened, points)
         else:
             curves = [opened.curve]
         result = edited_curve.write(context, opened, points, curves, self)
         self._store(opened, points)
-        self.report({"INFO"}, f'"{result.name}" through {len(points)} points{opened.remark}')
+        report = f'"{result.name}" through {len(points)} points{opened.remark}'
+        remarks = follow_now(context, [result])
+        self.report({"WARNING" if remarks else "INFO"}, "; ".join([report, *remarks]))
         return {"FINISHED"}
 
     def _given_via_points(self, opened: Opened) -> ViaPoints:

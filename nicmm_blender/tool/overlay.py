@@ -50,13 +50,15 @@ OUTLINE = (0.05, 0.05, 0.05)
 class _Drawn:
     """Points, (k, 3), via points, (m, 3), and line, (n, 3), in the local space of a mesh object.
 
-    `corners`, (k,), tells which of the points are corners.
+    `corners` and `junctions`, (k,), tell which of the points are corners, and which lie on other
+    curves.
     """
 
     mesh_uid: int
     surface: Surface
     points: np.ndarray
     corners: np.ndarray
+    junctions: np.ndarray
     via: np.ndarray
     line: np.ndarray
     problem: str = ""
@@ -91,6 +93,7 @@ def show_dragged(edited: Opened, curve: SurfaceCurve | None, problem: str = "") 
         edited.surface,
         edited.positions(),
         edited.points.corners,
+        edited.junctions,
         edited.via_positions(),
         edited_curve.polyline_of(edited.surface, curve),
         problem,
@@ -137,6 +140,7 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened.surface,
         opened.positions(),
         opened.points.corners,
+        opened.junctions,
         opened.via_positions(),
         opened.polyline(),
         "",
@@ -232,7 +236,7 @@ def _draw_points() -> None:
             fills[hit.index] = colours.hover
         elif hit.kind is Kind.VIA and hit.index < len(drawn.via):
             fills[n_points + hit.index] = colours.hover
-        elif hit.kind in {Kind.LINE, Kind.SURFACE}:
+        elif hit.kind in {Kind.LINE, Kind.JUNCTION, Kind.SURFACE}:
             marked = len(positions)
             positions = np.concatenate([positions, [hit.position]])
             fills.append(colours.hover)
@@ -244,13 +248,13 @@ def _draw_points() -> None:
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
         opacity = 1.0 if visible[number] else HIDDEN
-        size = 0.6 if number == marked else 1.0  # smaller where a click would add a point
+        # Smaller where a click would add a point, except on another curve.
+        on_curve = hit is not None and hit.kind is Kind.JUNCTION
+        size = 0.6 if number == marked and not on_curve else 1.0
         if n_points <= number != marked:
             shapes = _OUTLINED_RING, _RING
-        elif number < n_points and drawn.corners[number]:
-            shapes = _OUTLINED_SQUARE, _SQUARE
         else:
-            shapes = _OUTLINED_DISC, _DISC
+            shapes = _shapes_at(drawn, number, hit)
         for shape, colour in zip(shapes, (OUTLINE, fills[number]), strict=True):
             outlines.append(centres[number] + size * scale * shape)
             colour_of.append(np.tile((*colour[:3], opacity), (len(shape), 1)))
@@ -269,6 +273,20 @@ def _draw_points() -> None:
     gpu.state.blend_set("ALPHA")
     batch.draw(shader)
     gpu.state.blend_set("NONE")
+
+
+def _shapes_at(
+    drawn: _Drawn, number: int, hit: picking.Hit | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The outline and the filling of a control point, or of the mark where one would be added."""
+    if number >= len(drawn.points):
+        is_junction = hit is not None and hit.kind is Kind.JUNCTION
+        return (_OUTLINED_DIAMOND, _DIAMOND) if is_junction else (_OUTLINED_DISC, _DISC)
+    if drawn.junctions[number]:
+        if drawn.corners[number]:
+            return _OUTLINED_STAR, _STAR
+        return _OUTLINED_DIAMOND, _DIAMOND
+    return (_OUTLINED_SQUARE, _SQUARE) if drawn.corners[number] else (_OUTLINED_DISC, _DISC)
 
 
 def _visible(view: View, positions: np.ndarray) -> np.ndarray:
@@ -308,6 +326,12 @@ _RING = _ring(HOLE_RADIUS, RING_RADIUS)
 _OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, RING_RADIUS + OUTLINE_WIDTH)
 _SQUARE = _square(POINT_RADIUS)
 _OUTLINED_SQUARE = _square(POINT_RADIUS + OUTLINE_WIDTH)
+_TURN = np.array([[1.0, 1.0], [-1.0, 1.0]])
+"""A turn by 45 degrees that enlarges by the square root of 2, so that a diamond is as wide as a
+disc with a rim."""
+_DIAMOND, _OUTLINED_DIAMOND = _SQUARE @ _TURN, _OUTLINED_SQUARE @ _TURN
+_STAR = np.concatenate([_SQUARE, _DIAMOND / np.sqrt(2.0)])
+_OUTLINED_STAR = np.concatenate([_OUTLINED_SQUARE, _OUTLINED_DIAMOND / np.sqrt(2.0)])
 
 
 def towards_the_eye(

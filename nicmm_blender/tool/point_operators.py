@@ -138,6 +138,7 @@ class NICMM_OT_add_via_point(PointDrag, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     searches_course = True
+    snaps = False
 
     curve: CURVE
     leg: bpy.props.IntProperty(
@@ -172,6 +173,7 @@ class NICMM_OT_move_via_point(PointDrag, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     searches_course = True
+    snaps = False
 
     curve: CURVE
     index: VIA_INDEX

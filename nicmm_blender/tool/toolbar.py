@@ -85,6 +85,7 @@ class _SurfaceCurve:
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(properties, name)
+        layout.prop(properties, "avoid_others", text="Avoid Others")  # the header is narrow
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:
             for name in ("obstacle_group", "alignment_group"):
