@@ -51,7 +51,7 @@ from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
-from .repair.off_curves import Avoided, avoided_curves, check_not_crossed
+from .repair.off_curves import Avoided, avoided_curves, meeting_only_at_junctions
 from .repaired_surface import (
     Manifold,
     RepairedSurface,
@@ -191,7 +191,8 @@ class Designer:
                     design = manifold.design_on_original(found, request)
                     if request.avoid is not None:
                         avoided = avoided_curves(self.mesh, request.avoid, request.points)
-                        design = _check_not_crossed(self.mesh, design, avoided)
+                        clearance = request.clearance
+                        design = _off_avoided(self.mesh, design, avoided, clearance)
                     return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
@@ -334,21 +335,20 @@ class Designer:
         return last
 
 
-def _check_not_crossed(mesh: Mesh, design: Design, avoided: list[Avoided]) -> Design:
-    """A design without alternatives that cross avoided curves.
+def _off_avoided(mesh: Mesh, design: Design, avoided: list[Avoided], clearance: float) -> Design:
+    """A design that meets avoided curves only at junctions, without alternatives that cross them.
 
     Raises
     ------
     UnreachableError
         If the curve of the design itself crosses one of them.
     """
-    for curve in design.curves:
-        check_not_crossed(mesh, curve, avoided)
+    curves = [meeting_only_at_junctions(mesh, curve, avoided, clearance) for curve in design.curves]
     kept = []
     for other in design.alternatives:
         with contextlib.suppress(UnreachableError):
-            kept.append(_check_not_crossed(mesh, other, avoided))
-    return replace(design, alternatives=kept)
+            kept.append(_off_avoided(mesh, other, avoided, clearance))
+    return replace(design, curves=curves, alternatives=kept)
 
 
 def _answers(design: Design, manifold: Manifold, request: Request) -> bool:

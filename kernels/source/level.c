@@ -19,6 +19,10 @@
 #define MOST_ROUNDS 32 /* number of rounds in which nodes that cannot be retraced are put back */
 #define PAIRS 256      /* number of crossings that are found at a time */
 
+#define ROUGHNESS 1e-3 /* amount by which the energy may then be above the least one, relative to the
+                          energy without a map, for a curve that has converged; the energy of a
+                          nearly straight curve changes so much with the places of its nodes */
+
 enum { GOES_ON = 0, CONVERGED = 1, LIMITED = 2, STALLED = 3, LOST = 4 };
 
 typedef struct {
@@ -404,7 +408,8 @@ static void judge(const RelaxationRules *rules, const LevelRules *level, const N
         state->stalled = found->after < state->least_energy ? 0 : state->stalled + 1;
         state->least_energy = lesser(state->least_energy, found->after);
         if (state->stalled == MOST_STALLED) {
-            state->outcome = STALLED;
+            double above = found->after - state->least_energy;
+            state->outcome = above <= ROUGHNESS * found->scale ? CONVERGED : STALLED;
             return;
         }
         double least = level->least_decrease * scale_of_decrease(nodes, found, weights);

@@ -36,6 +36,7 @@ from ..outputs.cut import CutMesh, cut_mesh
 from ..progress import checkpoint
 from .clean_surface import CleanSurface
 from .face_parts import FaceParts, whole_faces
+from .junctions import straight_at_junctions
 from .mapped_mesh import MappedMesh
 from .nonmanifold import manifold
 from .removed_faces import points_at
@@ -73,7 +74,7 @@ the faces there, if that is at most `COARSEST`."""
 RINGS = 3
 """Number of rings of faces, around those within reach, that may be bisected with them."""
 
-STRIP = 0.02
+STRIP = 0.004
 """Width of a barrier on either side of the curve, as a fraction of the edges there."""
 
 DEVIATION = 1e-3
@@ -82,8 +83,11 @@ DEVIATION = 1e-3
 STRIP_OF_CLEARANCE = 0.1
 """Greatest such width, in clearances."""
 
-GAP = 0.1
+GAP = 0.02
 """Half the width of the gap at a junction, as a fraction of the longest edge there."""
+
+STRAIGHT = 2.0
+"""Distance from a junction up to which a curve is made straight, if necessary; in such widths."""
 
 GAP_OF_CLEARANCE = 0.5
 """Greatest half width of a gap, in clearances."""
@@ -151,6 +155,12 @@ class Avoided:
             faces, (1.0 - begin) * low + begin * high, (1.0 - stop) * low + stop * high
         )
         return found, 0.5 * (at[:-1] + at[1:])
+
+    def positions(self, arc: FloatArray) -> FloatArray:
+        """Positions at arc lengths, (s, 3)."""
+        curve, arcs = self.curve, self.arcs
+        line = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+        return np.stack([np.interp(arc, arcs, line[:, axis]) for axis in range(3)], axis=1)
 
     def from_junctions(self, arc: FloatArray) -> FloatArray:
         """Distance along the curve from arc lengths, (s,), to the nearest junction."""
@@ -291,17 +301,46 @@ def check_off_curves(
             )
 
 
-def check_not_crossed(mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]) -> None:
-    """Raise UnreachableError if a curve meets avoided curves elsewhere than at junctions."""
+def meeting_only_at_junctions(
+    mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided], clearance: float
+) -> SurfaceCurve:
+    """A curve that meets avoided curves only at its junctions.
+
+    If a curve crosses an avoided one beside a junction, it is made straight there.
+
+    Raises
+    ------
+    UnreachableError
+        If it also crosses one elsewhere.
+    """
+    if _crossed(mesh, curve, avoided) is None:
+        return curve
+    controls = curve.control_index[curve.control_index >= 0]
+    at, reach = [], []
+    for each in avoided:
+        for arc, position in zip(each.junctions, each.positions(each.junctions), strict=True):
+            away = np.linalg.norm(curve.points[controls] - position, axis=1)
+            at.append(int(controls[away.argmin()]))
+            reach.append(STRAIGHT * _gap(mesh, each, arc, clearance))
+    straight = straight_at_junctions(mesh, curve, np.array(at, dtype=np.int64), np.array(reach))
+    crossed = _crossed(mesh, straight, avoided)
+    if crossed is not None:
+        raise UnreachableError(
+            f"the curve would cross avoid[{crossed}]; move control points away from it, or use "
+            "a larger clearance"
+        )
+    return straight
+
+
+def _crossed(mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]) -> int | None:
+    """Index of an avoided curve that a curve meets elsewhere than at junctions, or None."""
     points = curve.points[curve.control_index[curve.control_index >= 0]]
     for number, each in enumerate(avoided):
         meeting = meeting_places(mesh, curve, each.curve)
         away = cdist(meeting, points).min(axis=1, initial=np.inf)
         if (away > MEETING * mesh.diagonal).any():
-            raise UnreachableError(
-                f"the curve would cross avoid[{number}]; move control points away from it, or use "
-                "a larger clearance"
-            )
+            return number
+    return None
 
 
 def _with_clearance(mapped: MappedMesh, avoided: Avoided, clearance: float) -> FaceSegments:
