@@ -15,7 +15,7 @@ from bpy.props import (
 
 from ..nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
-from .scene import curve_record
+from .scene import curve_record, mirror_plane
 
 AUTOMATIC = (
     "AUTO",
@@ -98,10 +98,48 @@ SURFACE = {
 }
 
 
+MIRROR = {
+    "mirror_axis": EnumProperty(
+        name="Mirror",
+        description="The plane in which a curve of the method Elastic is mirrored",
+        items=(
+            (mirror_plane.NONE, "None", "No mirror"),
+            ("X", "X", "The plane through the object's origin across its local X axis"),
+            ("Y", "Y", "The plane through the object's origin across its local Y axis"),
+            ("Z", "Z", "The plane through the object's origin across its local Z axis"),
+            (
+                mirror_plane.MODIFIER,
+                "Mirror Modifier",
+                "The plane of the first Mirror modifier of the mesh that the viewport shows",
+            ),
+        ),
+        default=mirror_plane.NONE,
+    ),
+    "mirror_as": EnumProperty(
+        name="Mirror As",
+        description="What becomes of the mirror image",
+        items=(
+            (
+                mirror_plane.JOINED,
+                "Joined",
+                "One curve through the points of one side and their mirror images, which is its "
+                "own mirror image",
+            ),
+            (
+                mirror_plane.PAIR,
+                "Pair",
+                "The curve and its mirror image, as two splines of one object",
+            ),
+        ),
+        default=mirror_plane.JOINED,
+    ),
+}
+
+
 class DesignProperties:
     """The options of a new curve, shared by the operator and the scene settings."""
 
-    __annotations__ = properties_of(OPTIONS) | SURFACE
+    __annotations__ = properties_of(OPTIONS) | SURFACE | MIRROR
 
 
 class EditingProperties:
@@ -114,6 +152,7 @@ class EditingProperties:
             if option.name not in (*curve_record.NEW_CURVE_OPTIONS, "method")
         )
         | SURFACE
+        | MIRROR
     )
 
 
@@ -323,7 +362,7 @@ def draw(
     mesh_object: bpy.types.Object | None,
 ) -> None:
     """Draw all settings in the redo panel; `mesh_object` may be None."""
-    draw_design(layout, properties)
+    draw_design(layout, properties, mesh_object)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
@@ -334,7 +373,9 @@ def draw(
 
 
 def draw_design(
-    layout: bpy.types.UILayout, properties: bpy.types.Operator | bpy.types.PropertyGroup
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    mesh_object: bpy.types.Object | None,
 ) -> None:
     """Draw the settings of the curve itself, without its maps."""
     layout.use_property_split = True
@@ -345,7 +386,28 @@ def draw_design(
     column.active = properties.method == "ELASTIC"
     column.prop(properties, "normal_bending")
     column.prop(properties, "alternatives")
+    draw_mirror(column, properties, mesh_object)
     layout.prop(properties, "use_modifiers")
+
+
+def draw_mirror(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    mesh_object: bpy.types.Object | None,
+) -> None:
+    """Draw the mirror: its axis as Blender's own tools have it, and its modifier if there is one.
+
+    What becomes of the image is greyed out without a mirror.
+    """
+    chosen = properties.mirror_axis
+    row = layout.row(align=True, heading="Mirror")
+    for axis in (mirror_plane.NONE, *mirror_plane.AXES):
+        row.prop_enum(properties, "mirror_axis", axis)
+    if chosen == mirror_plane.MODIFIER or mirror_plane.modifier_of(mesh_object) is not None:
+        layout.prop_enum(properties, "mirror_axis", mirror_plane.MODIFIER, icon="MOD_MIRROR")
+    row = layout.row()
+    row.active = chosen != mirror_plane.NONE
+    row.prop(properties, "mirror_as", expand=True)
 
 
 def draw_clearance(

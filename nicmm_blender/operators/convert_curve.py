@@ -6,7 +6,7 @@ from bpy.props import BoolProperty
 
 from .. import settings
 from ..outputs import curve_object, tube_radius, writing
-from ..scene import curve_record, mesh_data
+from ..scene import curve_record, mesh_data, mirror_plane
 from ..scene.messages import InputError
 from . import polls
 from .error_reports import with_error_reports
@@ -71,8 +71,9 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
             self._take_appearance(original, mesh_object)
         corners = curve_record.corners_of(original)
         via = curve_record.current_via_points(original, mesh_object, surface)
+        mirror = mirror_plane.mirror_of(mesh_object, surface, curve_settings)
         summary = writing.apply(
-            context, mesh_object, surface, curves, self, curve_settings, corners, via
+            context, mesh_object, surface, curves, self, curve_settings, corners, via, mirror
         )
         if is_separate:
             converted = context.active_object

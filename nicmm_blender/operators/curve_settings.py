@@ -15,7 +15,7 @@ from bpy.props import PointerProperty
 
 from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
-from ..scene import curve_record, surface_cache
+from ..scene import curve_record, mirror_plane, surface_cache
 from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
@@ -33,6 +33,8 @@ COURSE = (
     "obstacle_group",
     "alignment_group",
     "clearance",
+    "mirror_axis",
+    "mirror_as",
 )
 DRAWING = ("spline", "offset")
 
@@ -129,7 +131,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
         record = curve[curve_record.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         try:
-            writing.redraw(curve, opened.surface, curves, opened.points.corners)
+            writing.redraw(curve, opened.surface, curves, opened.points.corners, opened.mirror)
         except BaseException:
             if before is None:
                 del record["drawn"]
@@ -216,8 +218,10 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
-    for name in ("closed", "smoothness", "normal_bending"):
+    for name in ("closed", "smoothness", "normal_bending", "mirror_axis"):
         layout.prop(values, name)
+    if values.mirror_axis != mirror_plane.NONE:
+        layout.prop(values, "mirror_as", text="")
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")
@@ -230,8 +234,10 @@ def draw(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     values = curve.nicmm_settings
     layout.use_property_split = True
     layout.use_property_decorate = False
-    for name in ("closed", "smoothness", "normal_bending", "use_modifiers"):
+    for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
+    settings.draw_mirror(layout, values, curve_record.mesh_of(curve))
+    layout.prop(values, "use_modifiers")
     for name in ("spline", "radius", "offset"):
         layout.prop(values, name)
     if problem := problem_of(curve):

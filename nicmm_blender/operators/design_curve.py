@@ -16,6 +16,7 @@ from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
 from ..scene.surface import Surface, active_modifiers_text, read
 from . import polls
+from .asymmetry_report import asymmetry_text
 from .long_solves import LongSolves
 
 if TYPE_CHECKING:
@@ -133,12 +134,14 @@ class NICMM_OT_design_curve(
                 request.settings,
                 design_request.corners_of(request, each),
                 request.via,
+                request.mirror,
             )
             for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
         summary = f"{_summary(mesh_object, design, order, request.settings)}: {result}"
+        summary += asymmetry_text(context.scene, request.surface, design)
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
         if design.repairs:

@@ -7,18 +7,28 @@ An opened curve holds no references to Blender objects, since undo replaces them
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 
-from ...nicmm_core.options import FEWEST_OPEN
-from ..scene import curve_record, design_request, mesh_data, point_lists, surface_cache
+from ..scene import (
+    curve_record,
+    design_request,
+    mesh_data,
+    mirror_images,
+    mirror_plane,
+    point_lists,
+    surface_cache,
+)
 from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
+from ..scene.mirror_images import Images
+from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface, active_modifiers_text
 from ..scene.via_points import ViaPoints, leg_before, no_via_points, number_of_legs
 from . import curve_object, writing
@@ -26,6 +36,7 @@ from .writing import ObjectSettings
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core.geometry.plane_section import PlaneSection
     from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
@@ -57,6 +68,10 @@ class Opened:
         The recorded curve; None if the curve is new or has to be designed again.
     remark : str
         Text that is appended to reports; may be empty.
+    mirror : Mirror or None
+        The mirror of the curve.
+    image : SurfaceCurve of the core, or None
+        The mirror image of the curve if the object has both.
     """
 
     curve_uid: int
@@ -67,6 +82,37 @@ class Opened:
     via: ViaPoints
     curve: SurfaceCurve | None
     remark: str
+    mirror: Mirror | None = None
+    image: SurfaceCurve | None = None
+
+    @property
+    def curves(self) -> list[SurfaceCurve]:
+        """The curves of the object: none, the curve, or the curve and its mirror image."""
+        return [each for each in (self.curve, self.image) if each is not None]
+
+    @cached_property
+    def images(self) -> Images:
+        """The mirror images of the control points; none without a mirror."""
+        return mirror_images.images_of(self.surface, self.mirror, self.points)
+
+    def image_positions(self) -> np.ndarray:
+        """Positions of the images in the object's local space, (m, 3)."""
+        return self.surface.points(self.images.places.faces, self.images.places.barycentric)
+
+    @cached_property
+    def section(self) -> PlaneSection | None:
+        """Where the plane of a curve joined to its image cuts the surface; None for others."""
+        from ...nicmm_core.geometry.plane_section import plane_section
+
+        if self.mirror is None or not self.mirror.joined:
+            return None
+        return plane_section(surface_cache.core_mesh(self.surface), self.mirror.plane)
+
+    @property
+    def path(self) -> tuple[int, bool]:
+        """Number of points and closedness of a curve with the same legs; see `path_of`."""
+        closed = self.settings.closed
+        return mirror_images.path_of(self.surface, self.mirror, self.points.places, closed)
 
     @property
     def mesh_object(self) -> bpy.types.Object:
@@ -184,7 +230,8 @@ def open_curve(
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     points = ControlPoints(none, np.zeros(0, dtype=bool))
-    via, curve = no_via_points(), None
+    via, curve, image = no_via_points(), None, None
+    mirror = mirror_plane.mirror_of(mesh_object, surface, settings)
     if edited is not None:
         via = curve_record.current_via_points(edited, mesh_object, surface)
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
@@ -196,17 +243,19 @@ def open_curve(
             for name in SAME_COURSE if keeps_course else ():
                 kept = kept.with_value(name, getattr(before, name))
             if kept == before:
-                curve = _curve_of(edited, surface)
+                curve, image = _curves_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
-    return Opened(uid, mesh_object.session_uid, surface, settings, points, via, curve, remark)
+    return Opened(
+        uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, mirror, image
+    )
 
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
-    if len(points) < FEWEST_OPEN:
-        return []
     settings = replace(edited.settings, method="ELASTIC")
+    if not design_request.is_enough(edited.surface, edited.mirror, points, settings):
+        return []
     found = design_request.for_drawing(
         edited.mesh_object, edited.surface, points, edited.via, settings
     )
@@ -241,7 +290,9 @@ def write(
     if edited.curve_uid:
         return rewrite(edited, points, curves)
     mesh_object = edited.mesh_object
-    result = writing.as_object(mesh_object, edited.surface, curves, settings, points.corners)
+    result = writing.as_object(
+        mesh_object, edited.surface, curves, settings, points.corners, edited.mirror
+    )
     _record(result, mesh_object, edited, points, curves, writing.drawn_as(settings))
     curve_object.place(context, mesh_object, result)
     return result
@@ -252,7 +303,7 @@ def rewrite(edited: Opened, points: ControlPoints, curves: list[SurfaceCurve]) -
     result, mesh_object = edited.curve_object, edited.mesh_object
     if result is None:
         raise InputError(DELETED)
-    writing.redraw(result, edited.surface, curves, points.corners)
+    writing.redraw(result, edited.surface, curves, points.corners, edited.mirror)
     drawn = curve_record.drawn_as(result)
     _record(result, mesh_object, edited, points, curves, drawn)
     return result
@@ -267,7 +318,7 @@ def _record(
     drawn: Drawn | None,
 ) -> None:
     curve_settings = replace(edited.settings, method="ELASTIC")
-    via = edited.via.fitting(len(points), curve_settings.closed)
+    via = edited.via.fitting(*replace(edited, points=points).path)
     curve_record.write_record(
         result,
         mesh_object,
@@ -330,7 +381,7 @@ def with_toggled_corner(points: ControlPoints, number: int) -> ControlPoints:
 
 def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> ViaPoints:
     """The via points after the control point `place` has been inserted at an index."""
-    count, closed = len(edited.points), edited.settings.closed
+    count, closed = edited.path
     leg = leg_before(number, count, closed)
     via = edited.via
     divided, is_behind = via.legs == leg, np.zeros(len(via), dtype=bool)
@@ -342,7 +393,7 @@ def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> Vi
 
 def checked_leg(edited: Opened, leg: int) -> int:
     """The index of a leg; an error if the curve has no such leg."""
-    count = number_of_legs(len(edited.points), edited.settings.closed)
+    count = number_of_legs(*edited.path)
     if not 0 <= leg < count:
         raise InputError(f"There is no leg {leg}; the curve has {count}, counted from 0")
     return leg
@@ -365,10 +416,17 @@ def _along_leg(edited: Opened, leg: int, points: SurfacePoints) -> np.ndarray:
     return along_leg(edited.curve, leg, points.positions(mesh))
 
 
-def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:
-    """The recorded curve of an object, or None if it has to be designed again."""
+def _curves_of(
+    edited: bpy.types.Object, surface: Surface
+) -> tuple[SurfaceCurve | None, SurfaceCurve | None]:
+    """The recorded curve of an object and the image in its pair; None for what does not exist.
+
+    The curve is also None if it has to be designed again.
+    """
     if not curve_record.lies_on(edited, surface):
-        return None
+        return None, None
     curves = curve_record.read_curves(edited, surface)
+    if design_request.is_pair(curve_record.settings_of(edited)):
+        return curves[0], curves[1]
     whole = len(curves) == 1 and (curves[0].control_index >= 0).all()
-    return curves[0] if whole else None
+    return curves[0] if whole else None, None

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
-from . import mesh_data, record_check, surface_cache
+from . import mesh_data, mirror_plane, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .control_points import ControlPoints
 from .lookup import is_in
@@ -41,10 +41,10 @@ RECORD_KEY = "nicmm_curve"
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
-VERSION = 4
+VERSION = 5
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
-of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, and those
-up to 3 have no via points."""
+of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, those up
+to 3 have no via points, and those up to 4 no mirror."""
 
 FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
 """Methods by their names in records of versions before 3."""
@@ -73,7 +73,12 @@ def property_name(option: Option) -> str:
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
-UNCHANGED = (", use_modifiers=False", ", normal_bending=0.0")
+UNCHANGED = (
+    ", use_modifiers=False",
+    ", normal_bending=0.0",
+    ", mirror_axis='NONE'",
+    ", mirror_as='JOINED'",
+)
 """Settings whose values were the only ones before there were these settings."""
 
 NEW_CURVE_OPTIONS = ("order", "alternatives")
@@ -89,7 +94,7 @@ RECORDED = tuple(
 
 @dataclass(frozen=True)
 class CurveSettings:
-    """The settings of a curve, besides its control points: `RECORDED`, and the use of modifiers."""
+    """The settings of a curve, besides its control points: `RECORDED` and those of Blender."""
 
     closed: bool = True
     method: str = "ELASTIC"
@@ -99,6 +104,8 @@ class CurveSettings:
     clearance: float = 0.0
     alignment_group: str = ""
     use_modifiers: bool = True
+    mirror_axis: str = mirror_plane.NONE
+    mirror_as: str = mirror_plane.JOINED
 
     def __post_init__(self) -> None:
         """Raise an error if a setting is NaN or infinite."""
@@ -251,6 +258,8 @@ def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSetti
     found.update(surface.faces.tobytes())
     if settings.clearance > 0.0 and surface.unit != 1.0:
         found.update(np.float64(surface.unit).tobytes())
+    if (mirror := mirror_plane.mirror_of(mesh_object, surface, settings)) is not None:
+        found.update(mirror.argument().tobytes())
     for name in groups_of(settings):
         if name in mesh_object.vertex_groups:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
@@ -380,24 +389,21 @@ def curves_on(context: bpy.types.Context, mesh_object: bpy.types.Object) -> list
     ]
 
 
-def positions_of(curve_object: bpy.types.Object, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's local space.
+def lines_of(curve_object: bpy.types.Object, surface: Surface) -> list[np.ndarray]:
+    """The points of each curve of an object, (n, 3), in the mesh's local space.
 
     Points whose triangle no longer exists are left out; a closed curve ends with its first point.
     """
     record = _checked_record(curve_object)
-    found = []
-    for kind in (CONTROL, ""):
-        names = (f"{kind}corners", f"{kind}barycentric")
-        faces, barycentric = (np.zeros(0, np.int64), np.zeros((0, 3)))
-        if names[0] in record:
-            faces, barycentric = _find_points(record, *names, surface)
-        there = faces >= 0
-        found.append(surface.points(faces[there], barycentric[there]))
-    points, line = found
-    if len(record["closed"]) == 1 and record["closed"][0] and len(line):
-        line = np.concatenate([line, line[:1]])
-    return points, line
+    faces, barycentric = _find_points(record, "corners", "barycentric", surface)
+    lines = []
+    ends = np.cumsum(record["counts"], dtype=np.int64)
+    for end, count, closed in zip(ends, record["counts"], record["closed"], strict=True):
+        here = np.arange(end - count, end)
+        here = here[faces[here] >= 0]
+        line = surface.points(faces[here], barycentric[here])
+        lines.append(np.concatenate([line, line[:1]]) if closed else line)
+    return lines
 
 
 def lies_on(curve_object: bpy.types.Object, surface: Surface) -> bool:

@@ -6,7 +6,7 @@ import bpy
 from ..operators import curve_settings
 from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
-from ..scene import mesh_data
+from ..scene import mesh_data, mirror_plane
 from . import course_overlay, modes
 from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
@@ -83,8 +83,10 @@ class _SurfaceCurve:
             choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
-        for name in ("closed", "smoothness", "normal_bending"):
+        for name in ("closed", "smoothness", "normal_bending", "mirror_axis"):
             layout.prop(properties, name)
+        if properties.mirror_axis != mirror_plane.NONE:
+            layout.prop(properties, "mirror_as", text="")
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:
             for name in ("obstacle_group", "alignment_group"):
