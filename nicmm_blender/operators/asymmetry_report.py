@@ -13,8 +13,11 @@ from ..scene.surface import Surface
 if TYPE_CHECKING:
     from ...nicmm_core import Design
 
-SYMMETRIC = 1e-6
-"""Asymmetry up to which a curve counts as symmetric, in diagonals of the mesh."""
+SYMMETRIC = 1e-5
+"""Asymmetry up to which a curve counts as symmetric, in diagonals of the mesh.
+
+Blender stores the positions of vertices in single precision.
+"""
 
 
 def asymmetry_text(scene: bpy.types.Scene, surface: Surface, design: Design) -> str:

@@ -135,9 +135,9 @@ class Opened:
         """Positions of the via points in the object's local space, (m, 3)."""
         return self.surface.points(self.via.points.faces, self.via.points.barycentric)
 
-    def polyline(self) -> np.ndarray:
-        """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
-        return polyline_of(self.surface, self.curve)
+    def lines(self) -> list[np.ndarray]:
+        """Points of each curve in the object's local space, (n, 3); see `polyline_of`."""
+        return [polyline_of(self.surface, curve) for curve in self.curves]
 
 
 def positions_of(surface: Surface, points: ControlPoints) -> np.ndarray:
@@ -145,10 +145,8 @@ def positions_of(surface: Surface, points: ControlPoints) -> np.ndarray:
     return surface.points(points.places.faces, points.places.barycentric)
 
 
-def polyline_of(surface: Surface, curve: SurfaceCurve | None) -> np.ndarray:
+def polyline_of(surface: Surface, curve: SurfaceCurve) -> np.ndarray:
     """Points of a curve in the object's local space, (n, 3); a closed curve repeats the first."""
-    if curve is None:
-        return np.zeros((0, 3))
     line = surface.points(curve.faces, curve.barycentric)
     return np.concatenate([line, line[:1]]) if curve.closed else line
 

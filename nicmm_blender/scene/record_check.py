@@ -90,7 +90,7 @@ def _check_mirror(record: Record, count: int, control_counts: np.ndarray) -> Non
         Number of control points of each curve, images included.
     """
     asked = record.get("asked")
-    if not is_group(asked) or asked.get("mirror_axis", mirror_plane.NONE) == mirror_plane.NONE:
+    if asked is None or asked.get("mirror_axis", mirror_plane.NONE) == mirror_plane.NONE:
         return
     if asked.get("mirror_as") == mirror_plane.PAIR:
         fits = control_counts.tolist() in ([], [count, count])

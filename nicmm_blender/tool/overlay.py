@@ -87,11 +87,8 @@ _state = _State()
 def show_dragged(edited: Opened, curves: list[SurfaceCurve], problem: str = "") -> None:
     """Draw a curve that is being changed, with its changed points, instead of the active one."""
     _state.hover = None
-    _state.dragged = _Drawn(edited, _lines(edited, curves), problem, radius_of(edited))
-
-
-def _lines(opened: Opened, curves: list[SurfaceCurve]) -> list[np.ndarray]:
-    return [edited_curve.polyline_of(opened.surface, curve) for curve in curves]
+    lines = [edited_curve.polyline_of(edited.surface, curve) for curve in curves]
+    _state.dragged = _Drawn(edited, lines, problem, radius_of(edited))
 
 
 def show_active() -> None:
@@ -128,7 +125,7 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
-    return _Drawn(opened, _lines(opened, opened.curves), "", radius_of(opened))
+    return _Drawn(opened, opened.lines(), "", radius_of(opened))
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
@@ -275,10 +272,10 @@ class _Mark:
 
 def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_Mark]:
     """The marks of control points and via points, of their images, and of what is hovered."""
+    hovered_is = None if hit is None else (hit.kind, hit.index, hit.is_image)
 
     def fill(kind: Kind, index: int, is_image: bool = False) -> Colour:
-        is_hit = hit is not None and hit.kind is kind and hit.index == index
-        return colours.hover if is_hit and hit.is_image == is_image else colours.point
+        return colours.hover if hovered_is == (kind, index, is_image) else colours.point
 
     corners, marks = opened.points.corners, []
     for number, position in enumerate(opened.positions()):
@@ -290,8 +287,7 @@ def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_M
     for number, position in enumerate(opened.via_positions()):
         marks.append(_Mark(position, _RINGS, fill(Kind.VIA, number)))
     if hit is not None and hit.kind in {Kind.LINE, Kind.SURFACE}:
-        # Smaller where a click would add a point.
-        marks.append(_Mark(hit.position, tuple(0.6 * shape for shape in _DISCS), colours.hover))
+        marks.append(_Mark(hit.position, _SMALL_DISCS, colours.hover))
     return marks
 
 
@@ -336,6 +332,7 @@ def _outlined(
 
 
 _DISCS, _HOLLOW_DISCS = (_outlined(_ring, hole, POINT_RADIUS) for hole in (0.0, IMAGE_HOLE))
+_SMALL_DISCS = 0.6 * _DISCS[0], 0.6 * _DISCS[1]  # where a click would add a point
 _SQUARES, _HOLLOW_SQUARES = (_outlined(_square, hole, POINT_RADIUS) for hole in (0.0, IMAGE_HOLE))
 _RINGS = _outlined(_ring, HOLE_RADIUS, RING_RADIUS)
 

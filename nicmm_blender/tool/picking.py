@@ -228,9 +228,8 @@ def _hit(
         return Hit(Kind.VIA, name, number, tuple(via[number]), opened.mesh_uid)
     reach = CURVE_REACH * scale
     radius = 0.0 if curve is None else radius_of(curve, opened.surface)
-    for each in opened.curves:
-        line = edited_curve.polyline_of(opened.surface, each)
-        on_line = view.nearest_on_line(pixel, line, reach, radius)
+    for each, positions_along in zip(opened.curves, opened.lines(), strict=True):
+        on_line = view.nearest_on_line(pixel, positions_along, reach, radius)
         if on_line is not None:
             return _on_line(opened, each, view.mesh, name, *on_line)
     for line in other_lines(context):

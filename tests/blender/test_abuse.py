@@ -270,7 +270,7 @@ class Abuse(RuleBasedStateMachine):
         try:
             mesh_object, curve = picking.mesh_and_curve(bpy.context)
             if mesh_object is not None and picking.is_ready(bpy.context, mesh_object, curve):
-                picking.opened_now(bpy.context).polyline()
+                picking.opened_now(bpy.context).lines()
                 picking.other_lines(bpy.context)
         except (messages.InputError, core.NicmmError):
             return

@@ -327,7 +327,7 @@ class Helper:
             opened = picking.opened_now(bpy.context)
             view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
         core = import_module(f"{CORE}.geometry.curve")
-        line = opened.polyline()[core.points_of_leg(opened.curve, leg)]
+        line = opened.lines()[0][core.points_of_leg(opened.curve, leg)]
         seen = np.flatnonzero(view.visible(line))
         return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
