@@ -400,11 +400,18 @@ def draw_mirror(
     What becomes of the image is greyed out without a mirror.
     """
     chosen = properties.mirror_axis
-    row = layout.row(align=True, heading="Mirror")
+    # Buttons of single items do not take part in the split of labels and values.
+    split = layout.split(factor=0.4)
+    label = split.row()
+    label.alignment = "RIGHT"
+    label.label(text="Mirror")
+    items = split.column(align=True)
+    items.use_property_split = False
+    row = items.row(align=True)
     for axis in (mirror_plane.NONE, *mirror_plane.AXES):
         row.prop_enum(properties, "mirror_axis", axis)
     if chosen == mirror_plane.MODIFIER or mirror_plane.modifier_of(mesh_object) is not None:
-        layout.prop_enum(properties, "mirror_axis", mirror_plane.MODIFIER, icon="MOD_MIRROR")
+        items.prop_enum(properties, "mirror_axis", mirror_plane.MODIFIER, icon="MOD_MIRROR")
     row = layout.row()
     row.active = chosen != mirror_plane.NONE
     row.prop(properties, "mirror_as", expand=True)

@@ -6,7 +6,7 @@ Parts hidden by the mesh are dimmed. A mark under the mouse shows what a click w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,8 +37,8 @@ Colour = tuple[float, ...]
 HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
-IMAGE = 0.6
-"""Opacity of mirror images of control points, and of the plane, relative to the points."""
+IMAGE, PLANE = 0.6, 0.35
+"""Opacity of mirror images of control points, and of the line where a mirror cuts the mesh."""
 
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
 RING_RADIUS, HOLE_RADIUS, IMAGE_HOLE = 6.5, 4.5, 3.0
@@ -150,7 +150,8 @@ def _draw_lines() -> None:
     colours, surface = Colours(context), drawn.opened.surface
     if (plane := _plane_batch(drawn.opened)) is not None:
         nearer = towards_the_eye(context.region_data, mesh_object, surface, 0.0)
-        draw_line(context, nearer, plane, colours.point, PLANE_WIDTH, IMAGE)
+        layers = [(PLANE_WIDTH, colours.point)]
+        draw_layers(context, nearer, plane, layers, PLANE)
     nearer = towards_the_eye(context.region_data, mesh_object, surface, drawn.radius)
     colour = colours.problem if drawn.problem else colours.line
     for batch in _line_batches(drawn.lines):
@@ -169,9 +170,20 @@ def draw_line(
     batch: gpu.types.GPUBatch,
     colour: Colour,
     line_width: float = LINE_WIDTH,
+) -> None:
+    """Draw a line with an outline; parts that the mesh hides are dimmed."""
+    layers = [(line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)]
+    draw_layers(context, matrix, batch, layers)
+
+
+def draw_layers(
+    context: bpy.types.Context,
+    matrix: Matrix,
+    batch: gpu.types.GPUBatch,
+    layers: Sequence[tuple[float, Colour]],
     shown: float = 1.0,
 ) -> None:
-    """Draw a line with an outline; parts that the mesh hides are dimmed.
+    """Draw a line several times, with other widths and colours; hidden parts are dimmed.
 
     `shown` is the opacity of the other parts.
     """
@@ -184,7 +196,7 @@ def draw_line(
         gpu.matrix.load_matrix(matrix)
         shader.bind()
         shader.uniform_float("viewportSize", (region.width, region.height))
-        for width, shade in ((line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)):
+        for width, shade in layers:
             shader.uniform_float("lineWidth", width * scale)
             for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", shown)):
                 gpu.state.depth_test_set(test)
