@@ -408,13 +408,23 @@ def draw_mirror(
     items = split.column(align=True)
     items.use_property_split = False
     row = items.row(align=True)
-    for axis in (mirror_plane.NONE, *mirror_plane.AXES):
+    for axis in mirror_plane.AXES:
         row.prop_enum(properties, "mirror_axis", axis)
+    items.prop_enum(properties, "mirror_axis", mirror_plane.NONE)
     if chosen == mirror_plane.MODIFIER or mirror_plane.modifier_of(mesh_object) is not None:
         items.prop_enum(properties, "mirror_axis", mirror_plane.MODIFIER, icon="MOD_MIRROR")
     row = layout.row()
     row.active = chosen != mirror_plane.NONE
     row.prop(properties, "mirror_as", expand=True)
+
+
+def draw_mirror_in_header(layout: bpy.types.UILayout, properties: bpy.types.PropertyGroup) -> None:
+    """Draw the mirror in the header of the tool, where there is little room."""
+    row = layout.row(align=True)
+    row.label(icon="MOD_MIRROR")
+    row.prop(properties, "mirror_axis", text="")
+    if properties.mirror_axis != mirror_plane.NONE:
+        row.prop(properties, "mirror_as", text="")
 
 
 def draw_clearance(

@@ -15,7 +15,7 @@ from bpy.props import PointerProperty
 
 from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
-from ..scene import curve_record, mirror_plane, surface_cache
+from ..scene import curve_record, surface_cache
 from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
@@ -218,10 +218,9 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
-    for name in ("closed", "smoothness", "normal_bending", "mirror_axis"):
+    for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
-    if values.mirror_axis != mirror_plane.NONE:
-        layout.prop(values, "mirror_as", text="")
+    settings.draw_mirror_in_header(layout, values)
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")

@@ -25,6 +25,11 @@ def ends(opened: Opened, count: int) -> set[int]:
     return {0, count - 1} if opened.settings.closed else {count - 1}
 
 
+def may_be_inserted_on_plane(opened: Opened, number: int) -> bool:
+    """Whether a point that is inserted at an index may be on the plane."""
+    return number in ends(opened, len(opened.points) + 1)
+
+
 def may_end_on_plane(opened: Opened) -> bool:
     """Whether a new last point may be on the plane; an open curve needs one before it."""
     return bool(ends(opened, len(opened.points) + opened.settings.closed))

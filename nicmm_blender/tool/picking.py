@@ -25,7 +25,7 @@ from . import mirror_snap
 from .view import View, view_of
 
 if TYPE_CHECKING:
-    from ...nicmm_core import Mesh, SurfaceCurve
+    from ...nicmm_core import SurfaceCurve
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
@@ -231,7 +231,7 @@ def _hit(
     for each, positions_along in zip(opened.curves, opened.lines(), strict=True):
         on_line = view.nearest_on_line(pixel, positions_along, reach, radius)
         if on_line is not None:
-            return _on_line(opened, each, view.mesh, name, *on_line)
+            return _on_line(opened, each, view, name, scale, *on_line)
     for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
@@ -247,15 +247,23 @@ def _hit(
 
 
 def _on_line(
-    opened: Opened, curve: SurfaceCurve, mesh: Mesh, name: str, segment: int, share: float
+    opened: Opened,
+    curve: SurfaceCurve,
+    view: View,
+    name: str,
+    scale: float,
+    segment: int,
+    share: float,
 ) -> Hit:
     from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
 
-    place = point_on_segment(mesh, curve, segment, share)
+    place = point_on_segment(view.mesh, curve, segment, share)
     leg = leg_of_segment(curve, segment)
     if opened.mirror is not None and opened.mirror.joined:
         half = mirror_images.half_of(opened.surface, opened.mirror, opened.points.places)
         leg = half.leg_of(leg)
+        if mirror_snap.may_be_inserted_on_plane(opened, leg + 1):
+            place = mirror_snap.snapped(view, opened, place, scale)
     position = opened.surface.points(place.faces, place.barycentric)[0]
     is_image = curve is opened.image
     return Hit(Kind.LINE, name, leg + 1, tuple(position), opened.mesh_uid, is_image)

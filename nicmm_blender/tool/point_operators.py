@@ -99,6 +99,9 @@ class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
     def changed_via(self, opened: Opened) -> "ViaPoints":
         return edited_curve.via_after_insertion(opened, self.index, self.place(opened))
 
+    def may_be_on_plane(self, opened: Opened) -> bool:
+        return mirror_snap.may_be_inserted_on_plane(opened, self.index)
+
 
 class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
     """Move a control point of a curve on the surface"""

@@ -6,7 +6,8 @@ import bpy
 from ..operators import curve_settings
 from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
-from ..scene import mesh_data, mirror_plane
+from ..scene import mesh_data
+from ..settings import draw_mirror_in_header
 from . import course_overlay, modes
 from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
@@ -83,10 +84,9 @@ class _SurfaceCurve:
             choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
-        for name in ("closed", "smoothness", "normal_bending", "mirror_axis"):
+        for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(properties, name)
-        if properties.mirror_axis != mirror_plane.NONE:
-            layout.prop(properties, "mirror_as", text="")
+        draw_mirror_in_header(layout, properties)
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:
             for name in ("obstacle_group", "alignment_group"):

@@ -30,7 +30,7 @@ DRAGGED, JUMPING = 3, 1
 SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))
 """Sideways and backwards on the crown of Suzanne's head; with three corners, a shield."""
 
-HALF = ((0.3, 0.62), (0.55, -0.05), (-0.22, -0.62))
+HALF = ((0.3, 0.62), (0.45, -0.14), (-0.22, -0.62))
 """Sideways and upwards on the front of Suzanne's head, the last one on the other side."""
 
 SYMMETRIC = 2e-3
@@ -837,7 +837,7 @@ def symmetry(blender: Blender) -> None:
     step("Drag a mirror image: its point follows; J and Ctrl-click act on the point")
     before, old = state(blender), blender.do("value = helper.places()[1]")
     (image,) = blender.do("value = helper.pixels(helper.image_places()[1])")
-    drag(blender, image, 10, (-1.5, -4.0), "20-image-dragged")
+    drag(blender, image, 10, (1.0, 2.0), "20-image-dragged")
     blender.mouse("mouseup", 1)
     blender.wait(f"helper.state() != {before!r}", "the dragged curve")
     new = blender.do("value = helper.places()[1]")
