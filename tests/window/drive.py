@@ -861,7 +861,7 @@ def symmetry(blender: Blender) -> None:
     blender.wait(f"helper.state() == {dragged!r}", "undo")
 
     step("A click on the other half inserts the mirror image; drag it away from there")
-    (on_image,) = blender.do("value = helper.pixels(helper.mirrored_middle_of_leg(0))")
+    (on_image,) = blender.do("value = helper.pixels(helper.mirrored_middle_of_leg(1))")
     drag(blender, on_image, 10, (1.0, -2.0))
     blender.mouse("mouseup", 1)
     count_points(blender, 5)
