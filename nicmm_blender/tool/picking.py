@@ -275,7 +275,7 @@ def _read(context: bpy.types.Context) -> tuple[Opened, list[Line]]:
     if mesh_object is None:
         raise InputError(polls.NO_MESH_OR_CURVE)
     uid = 0 if curve is None else curve.session_uid
-    panel = context.scene.nicmm_curves.use_modifiers
+    panel = curve_record.settings_from(context.scene.nicmm_curves)
     # Another viewport may be in local view and show other curves.
     view = 0 if context.space_data is None else context.space_data.as_pointer()
     key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode, view

@@ -14,6 +14,7 @@ from tests.blender import scenes
 from tests.blender.scenes import module
 from tests.blender.test_curve_list import run_timer
 from tests.blender.test_point_operators import call, content, controls, refusal
+from tests.blender.test_view import looking
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
@@ -741,3 +742,93 @@ def test_images_in_the_tool(joined, empty_scene):
 def test_legs_with_points_on_the_plane(empty_scene, on_plane, legs):
     half = module(empty_scene, "scene.mirror_images").Half(3, 6 - sum(on_plane), *on_plane)
     assert [half.leg_of(leg) for leg in range(half.total)] == legs
+
+
+def opened_and_view(extension, curve=None):
+    edited_curve = module(extension, "outputs.edited_curve")
+    opened = edited_curve.open_curve(bpy.context, curve)
+    return opened, looking(extension, opened)
+
+
+@pytest.mark.parametrize("pixels", [4.0, -7.0, 9.0, -20.0])
+def test_points_snap_to_the_plane(joined, empty_scene, pixels):
+    opened, view = opened_and_view(empty_scene, joined)
+    snap = module(empty_scene, "tool.mirror_snap")
+    on_plane = view.project(np.array([[0.0, -0.95, 0.3]]))[0]
+    place = view.surface_point_at(on_plane + [pixels, 0.0])
+    found = snap.snapped(view, opened, place, 1.0)
+    position = opened.surface.points(found.faces, found.barycentric)[0]
+    if abs(pixels) < snap.REACH:
+        assert abs(position[0]) < 1e-9
+        assert (
+            np.linalg.norm(position - opened.surface.points(place.faces, place.barycentric)) < 0.1
+        )
+    else:
+        assert found is place
+
+
+def test_which_points_may_be_on_the_plane(sphere, empty_scene):
+    snap = module(empty_scene, "tool.mirror_snap")
+    panel = bpy.context.scene.nicmm_curves
+    scenes.activate(sphere)
+    for axis, closed, wanted in (("X", True, True), ("X", False, False), ("NONE", True, False)):
+        panel.mirror_axis, panel.closed = axis, closed
+        assert snap.may_end_on_plane(opened_and_view(empty_scene)[0]) == wanted
+    for closed, ends in ((True, {0, 2}), (False, {2})):
+        opened, _ = opened_and_view(empty_scene, draw(sphere, closed=closed))
+        assert snap.ends(opened, 3) == ends
+        assert snap.may_end_on_plane(opened) and snap.may_be_inserted_on_plane(opened, 3)
+        assert snap.may_be_inserted_on_plane(opened, 0) == closed
+        assert not snap.may_be_inserted_on_plane(opened, 1)
+    opened, _ = opened_and_view(empty_scene, draw(sphere, mirror_as="PAIR"))
+    assert not snap.may_end_on_plane(opened)
+
+
+@pytest.mark.parametrize("how", ["JOINED", "PAIR"])
+def test_clicks_on_the_curve_and_its_image(sphere, empty_scene, how):
+    """They lead to the same leg of the points of one side, and snap to the plane between them."""
+    curve = draw(sphere, mirror_as=how)
+    opened, view = opened_and_view(empty_scene, curve)
+    picking = module(empty_scene, "tool.picking")
+    core = import_module(f"{scenes.installed_core().__name__}.geometry.curve")
+    for leg in (0, 1):
+        segment = int(core.points_of_leg(opened.curve, leg)[5])
+        place = opened.lines()[0][segment]
+        for each, wanted in zip((place, flipped(place)), ("", "image"), strict=True):
+            found = [
+                (line, view.nearest_on_line(view.project(each[None])[0], line, 3.0))
+                for line in opened.lines()
+            ]
+            number = next(k for k, (_, hit) in enumerate(found) if hit is not None)
+            hit = picking._on_line(
+                opened, opened.curves[number], view, curve.name, 1.0, *found[number][1]
+            )
+            assert hit.index == leg + 1
+            assert hit.is_image == (how == "PAIR" and wanted == "image")
+            np.testing.assert_allclose(hit.position, each, atol=0.01)
+    if how == "JOINED":
+        segments = core.points_of_leg(opened.curve, 2)
+        heights = np.abs(opened.lines()[0][segments][:, 0])
+        hit = picking._on_line(
+            opened, opened.curve, view, curve.name, 1.0, int(segments[heights.argmin()]), 0.0
+        )
+        assert hit.index == 3 and abs(hit.position[0]) < 1e-9
+
+
+def test_a_dragged_pair_follows(pair, sphere, empty_scene):
+    """Each move gives both curves, and so does the design that is taken in the end."""
+    edited_curve = module(empty_scene, "outputs.edited_curve")
+    opened = edited_curve.open_curve(bpy.context, pair)
+    (request,) = edited_curve.request(opened, opened.points)
+    live = module(empty_scene, "tool.live_curve").LiveCurve(request)
+    place = edited_curve.surface_points_at(opened, np.array(on(sphere, [(0.4, -0.8, 0.45)])), "p")
+    live.move(edited_curve.with_point(opened.points, 0, place, replaced=True))
+    for _ in range(80):
+        assert len(live.curves) == 2 and not live.problem
+        image = flipped(live.curves[0].points)
+        assert off_line(image, live.curves[1].points) < 1e-5
+        live.step()
+    design = live.design
+    assert [curve.closed for curve in design.curves] == [True, True]
+    live.set_result(design)
+    assert len(live.request.start.curves) == 1 and len(live.curves) == 2
