@@ -99,14 +99,12 @@ class Opened:
         """Positions of the images in the object's local space, (m, 3)."""
         return self.surface.points(self.images.places.faces, self.images.places.barycentric)
 
-    @cached_property
+    @property
     def section(self) -> PlaneSection | None:
         """Where the plane of a curve joined to its image cuts the surface; None for others."""
-        from ...nicmm_core.geometry.plane_section import plane_section
-
         if self.mirror is None or not self.mirror.joined:
             return None
-        return plane_section(surface_cache.core_mesh(self.surface), self.mirror.plane)
+        return surface_cache.section_with(self.surface, self.mirror.plane)
 
     @property
     def path(self) -> tuple[int, bool]:
@@ -221,11 +219,8 @@ def open_curve(
     beyond = active_modifiers_text(mesh_object)
     if beyond and not settings.use_modifiers:
         remarks.append(f"on the mesh without its {beyond}")
-    for name in MAPS:
-        group = getattr(settings, name)
-        if edited is not None and group and group not in mesh_object.vertex_groups:
-            settings = settings.with_value(name, "")
-            remarks.append(f'without the vertex group "{group}", which no longer exists')
+    if edited is not None:
+        settings = _without_missing_maps(mesh_object, settings, remarks)
     none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     points = ControlPoints(none, np.zeros(0, dtype=bool))
     via, curve, image = no_via_points(), None, None
@@ -247,6 +242,18 @@ def open_curve(
     return Opened(
         uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, mirror, image
     )
+
+
+def _without_missing_maps(
+    mesh_object: bpy.types.Object, settings: CurveSettings, remarks: list[str]
+) -> CurveSettings:
+    """Settings without maps that no longer exist, each of which adds a remark."""
+    for name in MAPS:
+        group = getattr(settings, name)
+        if group and group not in mesh_object.vertex_groups:
+            settings = settings.with_value(name, "")
+            remarks.append(f'without the vertex group "{group}", which no longer exists')
+    return settings
 
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:

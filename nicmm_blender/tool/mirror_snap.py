@@ -37,10 +37,11 @@ def may_end_on_plane(opened: Opened) -> bool:
 
 def snapped(view: View, opened: Opened, place: SurfacePoints, scale: float) -> SurfacePoints:
     """A point on the surface, moved to the plane if it appears near to it in the viewport."""
-    if opened.section is None:
+    section = opened.section
+    if section is None:
         return place
     (position,) = place.positions(surface_cache.core_mesh(opened.surface))
-    nearest = opened.section.nearest(position)
+    nearest = section.nearest(position)
     if nearest is None:
         return place
     both = [opened.surface.points(each.faces, each.barycentric)[0] for each in (place, nearest)]
