@@ -822,8 +822,9 @@ def symmetry(blender: Blender) -> None:
     check_symmetric(blender)
     undo_and_redo(blender, states, "of a symmetric curve")
 
-    step("Near the plane, the mark and the point snap to it")
-    (chin,) = blender.do("value = helper.pixels(helper.shown_in_front([(0.0, -0.9)]))")
+    step("Where the curve crosses the plane, the mark and the point snap to it")
+    lowest = "min(helper.line(), key=lambda place: (abs(place[0]) > 0.03, place[2]))"
+    (chin,) = blender.do(f"value = helper.pixels([{lowest}])")
     beside = chin[0] + 4, chin[1]
     blender.move(beside)
     time.sleep(1.0)
