@@ -53,6 +53,8 @@ MEASUREMENTS = (
     "defects",
     "gallery",
     "obstacles",
+    "several_curves",
+    "option_costs",
     "lanes",
     "sharp_edges",
     "guarantee",

@@ -88,6 +88,17 @@ def _property(option: Option) -> "bpy.props._PropertyDeferred":
     return FloatProperty(**words, **limits, subtype=subtype, default=default)
 
 
+OTHERS = {
+    "avoid_others": BoolProperty(
+        name="Avoid Other Curves",
+        description="Keep the curve from crossing the curves above it in the list of curves, and "
+        "at Clearance from them. It follows when they change. Control points on another curve are "
+        "junctions. Only with the method Elastic",
+        default=False,
+    )
+}
+"""The property of a curve that it avoids other curves."""
+
 SURFACE = {
     "use_modifiers": BoolProperty(
         name="Use Modifiers",
@@ -139,7 +150,7 @@ MIRROR = {
 class DesignProperties:
     """The options of a new curve, shared by the operator and the scene settings."""
 
-    __annotations__ = properties_of(OPTIONS) | SURFACE | MIRROR
+    __annotations__ = properties_of(OPTIONS) | OTHERS | SURFACE | MIRROR
 
 
 class EditingProperties:
@@ -151,6 +162,7 @@ class EditingProperties:
             for option in OPTIONS
             if option.name not in (*curve_record.NEW_CURVE_OPTIONS, "method")
         )
+        | OTHERS
         | SURFACE
         | MIRROR
     )
@@ -386,8 +398,21 @@ def draw_design(
     column.active = properties.method == "ELASTIC"
     column.prop(properties, "normal_bending")
     column.prop(properties, "alternatives")
+    draw_avoid_others(column, properties)
     draw_mirror(column, properties, mesh_object)
     layout.prop(properties, "use_modifiers")
+
+
+def draw_avoid_others(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    label: str = "Avoid Other Curves",
+) -> None:
+    """Draw whether the curve avoids others, greyed out if it is joined to its mirror image."""
+    has_mirror = properties.mirror_axis != mirror_plane.NONE
+    row = layout.row()
+    row.active = not (has_mirror and properties.mirror_as == mirror_plane.JOINED)
+    row.prop(properties, "avoid_others", text=label)
 
 
 def draw_mirror(
@@ -430,9 +455,9 @@ def draw_mirror_in_header(layout: bpy.types.UILayout, properties: bpy.types.Prop
 def draw_clearance(
     layout: bpy.types.UILayout, properties: bpy.types.Operator | bpy.types.PropertyGroup
 ) -> None:
-    """Draw the clearance, greyed out if there are no obstacles."""
+    """Draw the clearance, greyed out if there is nothing to keep it from."""
     row = layout.row()
-    row.active = bool(properties.obstacle_group)
+    row.active = bool(properties.obstacle_group) or properties.avoid_others
     row.prop(properties, "clearance")
 
 

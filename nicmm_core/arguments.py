@@ -48,13 +48,15 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     checked = {each.name: _checked(mesh, each, given[each.name]) for each in options.OPTIONS}
     for each in options.OPTIONS:
         value = checked[each.name]
+        # Values of compound kinds may be arrays, which cannot be compared.
+        is_set = value is not None if each.default is None else value != each.default
         missing = each.needs and all(checked[name] is None for name in each.needs)
-        if missing and value != each.default:
+        if missing and is_set:
             raise ArgumentError(
                 f"{each.name} has no effect without {' or '.join(each.needs)}; pass both, or "
                 f"leave {each.name} out"
             )
-        if each.elastic_only and value != each.default and checked["method"] != "elastic":
+        if each.elastic_only and is_set and checked["method"] != "elastic":
             raise ArgumentError(
                 f'{each.name} needs the method "elastic", not {checked["method"]!r}; leave one out'
             )

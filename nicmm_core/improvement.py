@@ -37,6 +37,15 @@ BENT = 15.0
 STRONGLY_BENT = 30.0
 """L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
 
+WITH_NORMAL_BENDING = 8.0
+"""Increase of these three bounds, relative to them, for each unit of `normal_bending`.
+
+The fairest curve then bends more along the surface in order to bend less with it.
+"""
+
+WITH_AVOIDED_CURVES = 2.5
+"""Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
+
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
@@ -287,7 +296,7 @@ class Improvement:
         The first repeated search is worthwhile if the best curve bends; those after it, only if it
         is still strongly bent and two searches have not found the same curve.
         """
-        least = SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT
+        least = self._bound(SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT)
         promising = self._bending > least and not self.repeat_found_same_curve
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
@@ -295,11 +304,11 @@ class Improvement:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
         least = min(scaled_bending(each.discrete_curve) for each in self.relaxed[first:])
         mean = self._work_of_relaxations / len(self.relaxed)
-        return least > STRONGLY_BENT and self._is_affordable(mean + RESERVED)
+        return least > self._bound(STRONGLY_BENT) and self._is_affordable(mean + RESERVED)
 
     def _should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
-        return self._bending > BENT and self._is_affordable(WORK_OF_PART)
+        return self._bending > self._bound(BENT) and self._is_affordable(WORK_OF_PART)
 
     def _should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
@@ -309,6 +318,11 @@ class Improvement:
         """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
         mean = self._work_of_relaxations / len(self.relaxed)
         return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+
+    def _bound(self, bending: float) -> float:
+        """A bound of the bending, with regard to other options that make the curve bend."""
+        of_normal_bending = 1.0 + WITH_NORMAL_BENDING * self.request.normal_bending
+        return bending * of_normal_bending * (WITH_AVOIDED_CURVES if self.request.avoid else 1.0)
 
     def _limited(self, config: RelaxationConfig) -> RelaxationConfig:
         """Settings with which another relaxation does at most the work that is left."""

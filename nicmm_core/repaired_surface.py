@@ -21,10 +21,11 @@ from itertools import product
 import numpy as np
 
 from .design_result import Design
+from .displaced_start import displaced
 from .errors import CurveError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
+from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, lies_on, weights_in_faces
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, coincide, joined
@@ -105,18 +106,16 @@ class Manifold:
             If the curve enters faces that curves may not enter, cannot be mapped at a non-manifold
             edge, or lies on another component.
         """
-        for copy in self.copies:
+        for number, copy in enumerate(self.copies):
             mapped = copy.curve_to(curve)
             if mapped is None and copy is self.repaired:
                 raise CurveError(
                     "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at "
                     f"a non-manifold edge{WITHOUT_START}"
                 )
-            if mapped is None and isinstance(copy, MappedMesh):
-                raise CurveError(
-                    "start crosses a curve of avoid, or comes closer to one than the clearance"
-                    f"{WITHOUT_START}"
-                )
+            is_cut = isinstance(copy, MappedMesh) and copy is not self.repaired
+            if is_cut and (mapped is None or not lies_on(copy.mesh, mapped)):
+                return self._displaced(curve, self.copies[number:])
             if mapped is None:
                 raise CurveError(
                     "start and control_points lie on different components of the mesh"
@@ -124,6 +123,20 @@ class Manifold:
                 )
             curve = mapped
         return curve
+
+    def _displaced(self, curve: SurfaceCurve, copies: Copies) -> SurfaceCurve:
+        """A curve before some copies, moved off the curves that are avoided."""
+        points = curve.points
+        for copy in copies:
+            points = copy.from_original(points)
+        surface = self.designer.surface.without_maps
+        moved = displaced(surface, points, curve.closed, curve.control_index)
+        if moved is None:
+            raise CurveError(
+                "start crosses a curve of avoid, or comes much closer to one than the clearance"
+                f"{WITHOUT_START}"
+            )
+        return moved
 
     def design_on_original(self, design: Design, request: Request) -> Design:
         """Map a design to the given mesh, on which it is requested.

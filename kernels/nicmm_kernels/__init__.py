@@ -16,6 +16,7 @@ from .edge_paths import (
 )
 from .least_sums import least_sums
 from .legs import PathArrays, best_legs, cell_sets, distinct_routes
+from .level_refinement import LevelLimits, PartArrays, refine_at_level
 from .levels import (
     CurveArrays,
     CurveRelaxation,
@@ -29,6 +30,7 @@ from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import BatchRules, relax_curves
+from .segment_distances import SegmentPaths, TooManyWindowsError
 from .steps import (
     ContactRules,
     EnergyRules,
@@ -51,6 +53,7 @@ __all__ = [
     "EdgeGraphArrays",
     "EnergyRules",
     "KernelError",
+    "LevelLimits",
     "LevelOutcome",
     "LevelRules",
     "LevelState",
@@ -58,14 +61,17 @@ __all__ = [
     "MeshArrays",
     "MissingLibraryError",
     "NodeArrays",
+    "PartArrays",
     "PathArrays",
     "PlacementRules",
     "RelaxationRules",
+    "SegmentPaths",
     "SpacingRules",
     "StepLimits",
     "StepRules",
     "SurfaceArrays",
     "TraceArrays",
+    "TooManyWindowsError",
     "TraceLimits",
     "best_legs",
     "cell_sets",
@@ -84,6 +90,7 @@ __all__ = [
     "places_on_traces",
     "points_on_edge_paths",
     "polyline_crossings",
+    "refine_at_level",
     "relax_curves",
     "segment_ends",
     "trace_between",

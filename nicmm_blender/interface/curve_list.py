@@ -4,6 +4,7 @@
 import bpy
 from bpy.props import IntProperty
 
+from ..operators.move_curve import NICMM_OT_move_curve
 from ..operators.update_curves import NICMM_OT_update_curves
 from ..outputs import edited_curve
 from ..scene import curve_record
@@ -48,7 +49,8 @@ class NICMM_UL_curves(bpy.types.UIList):
     def filter_items(
         self, context: bpy.types.Context, data: bpy.types.BlendData, name: str
     ) -> tuple[list[int], list[int]]:
-        shown = set(curve_record.designed_on(curve_record.mesh_of_context(context)))
+        in_order = curve_record.designed_on(curve_record.mesh_of_context(context))
+        shown = set(in_order)
         objects = getattr(data, name)
         wanted = self.filter_name.casefold()
         item = self.bitflag_filter_item
@@ -58,7 +60,11 @@ class NICMM_UL_curves(bpy.types.UIList):
             (item if wanted in found.name.casefold() else 0) if found in shown else other
             for found in objects
         ]
-        return flags, []
+        if self.use_filter_sort_alpha:  # the objects of a file are sorted by name
+            return flags, []
+        places = {found: place for place, found in enumerate(in_order)}
+        keys = [(index, places.get(found, -1)) for index, found in enumerate(objects)]
+        return flags, bpy.types.UI_UL_list.sort_items_helper(keys, lambda key: key[1])
 
 
 def _active_index(_window_manager: bpy.types.WindowManager) -> int:
@@ -81,10 +87,16 @@ def _activate(_window_manager: bpy.types.WindowManager, index: int) -> None:
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the list and its buttons."""
-    layout.template_list(
+    row = layout.row()
+    row.template_list(
         NICMM_UL_curves.__name__, "", bpy.data, "objects", context.window_manager,
         "nicmm_active_curve", rows=3,
     )  # fmt: skip
+    arrows = row.column(align=True)
+    arrows.enabled = edited_curve.active(context) is not None
+    for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+        arrow = arrows.operator(NICMM_OT_move_curve.bl_idname, text="", icon=icon)
+        arrow.direction = direction
     row = layout.row(align=True)
     row.operator(NICMM_OT_update_curves.bl_idname, icon=UPDATE_ICON)
     row.prop(context.scene, "nicmm_live_update", text="Live", toggle=True, icon="PLAY")

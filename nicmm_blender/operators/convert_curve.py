@@ -6,7 +6,7 @@ from bpy.props import BoolProperty
 
 from .. import settings
 from ..outputs import curve_object, tube_radius, writing
-from ..scene import curve_record, mesh_data, mirror_plane
+from ..scene import avoided_curves, curve_record, mesh_data, mirror_plane
 from ..scene.messages import InputError
 from . import polls
 from .error_reports import with_error_reports
@@ -72,11 +72,23 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         corners = curve_record.corners_of(original)
         via = curve_record.current_via_points(original, mesh_object, surface)
         mirror = mirror_plane.mirror_of(mesh_object, surface, curve_settings)
+        others = avoided_curves.above(original, mesh_object, surface, curve_settings)
         summary = writing.apply(
-            context, mesh_object, surface, curves, self, curve_settings, corners, via, mirror
+            context,
+            mesh_object,
+            surface,
+            curves,
+            self,
+            curve_settings,
+            corners,
+            via,
+            mirror,
+            others,
         )
         if is_separate:
             converted = context.active_object
+            if not self.keep_original:
+                curve_record.take_place_of(converted, original)
             for material in original.data.materials:
                 converted.data.materials.append(material)
         if not self.keep_original:

@@ -166,7 +166,7 @@ def _without_via_points(opened: Opened, leg: int) -> Opened:
 def _key(opened: Opened, leg: int) -> Key:
     """Everything that the courses of a curve, or of one of its legs, depend on."""
     points, via = opened.points.places, opened.via
-    on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
+    on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings, opened.others)
     arrays = [points.faces, points.barycentric, opened.points.corners]
     arrays += [via.legs, via.points.faces, via.points.barycentric]
     if leg != WHOLE and opened.curve is not None:  # the other legs keep their courses

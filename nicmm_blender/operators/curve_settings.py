@@ -15,11 +15,12 @@ from bpy.props import PointerProperty
 
 from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
-from ..scene import curve_record, surface_cache
+from ..scene import curve_order, curve_record, surface_cache
 from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
-from .long_solves import answer_now
+from .answers import answer_now
+from .followers import follow_now
 from .message_labels import draw_message
 
 Value = bool | float | str
@@ -29,6 +30,7 @@ COURSE = (
     "closed",
     "smoothness",
     "normal_bending",
+    "avoid_others",
     "use_modifiers",
     "obstacle_group",
     "alignment_group",
@@ -76,19 +78,26 @@ def _read(group: bpy.types.PropertyGroup, name: str, default: Value) -> Value:
         return default
 
 
-def _write(group: bpy.types.PropertyGroup, change: Callable[[bpy.types.Object], None]) -> None:
-    """Change a curve, or store the reason why that is impossible."""
+def _write(
+    group: bpy.types.PropertyGroup, change: Callable[[bpy.types.Object], list[str] | None]
+) -> None:
+    """Change a curve, or store the reason why that is impossible.
+
+    `change` may return remarks about other curves, which are shown too.
+    """
     from ... import nicmm_core as nicmm
 
     curve = group.id_data
     if not curve_record.has_record(curve):
         return
     try:
-        change(curve)
+        remarks = change(curve)
     except (InputError, nicmm.NicmmError, ImportError) as error:
         _problems[curve.session_uid] = curve_record.digest_of(curve), str(error)
     else:
         _problems.pop(curve.session_uid, None)
+        if remarks:
+            _problems[curve.session_uid] = curve_record.digest_of(curve), "; ".join(remarks)
         _push_undo_later()
 
 
@@ -117,7 +126,8 @@ def _cancel_undo() -> None:
         bpy.app.timers.unregister(_push_undo)
 
 
-def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
+def _change(curve: bpy.types.Object, name: str, value: Value) -> list[str]:
+    """Change a setting of a curve; return remarks about other curves that cannot follow."""
     context = bpy.context
     check_finite(name, value)
     curve_settings = curve_record.settings_of(curve)
@@ -128,7 +138,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
         curves = (
             curve_record.read_curves(curve, opened.surface) if curve_record.has_curve(curve) else []
         )
-        record = curve[curve_record.RECORD_KEY]
+        record = curve[curve_order.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         try:
             writing.redraw(curve, opened.surface, curves, opened.points.corners, opened.mirror)
@@ -139,7 +149,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
                 record["drawn"] = before
             raise
         surface_cache.note_change()
-        return
+        return []
     wanted = curve_settings.with_value(name, value)
     if value or name not in edited_curve.MAPS:
         _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
@@ -147,6 +157,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
     requests = edited_curve.request(opened, opened.points)
     curves = edited_curve.curves_of(answer_now(context, requests))
     edited_curve.rewrite(opened, opened.points, curves)
+    return follow_now(context, [curve])
 
 
 def _check_maps(mesh_object: bpy.types.Object, wanted: CurveSettings) -> None:
@@ -220,6 +231,7 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     mesh_object = curve_record.mesh_of(curve)
     for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
+    settings.draw_avoid_others(layout, values, "Avoid Others")  # the header is narrow
     settings.draw_mirror_in_header(layout, values)
     if mesh_object is not None:
         for name in edited_curve.MAPS:
@@ -235,6 +247,7 @@ def draw(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     layout.use_property_decorate = False
     for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
+    settings.draw_avoid_others(layout, values)
     settings.draw_mirror(layout, values, curve_record.mesh_of(curve))
     layout.prop(values, "use_modifiers")
     for name in ("spline", "radius", "offset"):

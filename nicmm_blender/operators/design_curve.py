@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 
 from .. import settings
 from ..outputs import writing
-from ..scene import curve_record, design_request, mesh_data, selection
+from ..scene import curve_order, curve_record, design_request, mesh_data, selection
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
 from ..scene.surface import Surface, active_modifiers_text, read
@@ -123,20 +123,14 @@ class NICMM_OT_design_curve(
         if not design.curves:
             raise InputError(str(design.status))
         mesh_object = request.mesh_object()
-        result = [
-            writing.apply(
-                context,
-                mesh_object,
-                request.surface,
-                each.curves,
-                self,
-                request.settings,
-                design_request.corners_of(request, each),
-                request.via,
-                request.mirror,
-            )
-            for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
-        ][-1]
+        for each in design.alternatives[::-1]:
+            # An alternative is not meant to be together with the fairest curve.
+            chosen = replace(request.settings, avoid_others=False)
+            self._write(context, replace(request, settings=chosen, others=()), each)
+        result = self._write(context, request, design)  # the last one is active
+        if design.alternatives:
+            count = 1 + len(design.alternatives)
+            curve_order.reverse(curve_record.designed_on(mesh_object)[-count:])
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
         summary = f"{_summary(mesh_object, design, order, request)}: {result}"
@@ -152,6 +146,21 @@ class NICMM_OT_design_curve(
         else:
             self.report({"WARNING"}, f"{summary}; {design.status}")
         return {"FINISHED"}
+
+    def _write(self, context: bpy.types.Context, request: DesignRequest, design: "Design") -> str:
+        """Make the output of a design, and return a summary."""
+        return writing.apply(
+            context,
+            request.mesh_object(),
+            request.surface,
+            design.curves,
+            self,
+            request.settings,
+            design_request.corners_of(request, design),
+            request.via,
+            request.mirror,
+            request.others,
+        )
 
 
 def _alternatives(operator: NICMM_OT_design_curve) -> int:

@@ -22,13 +22,13 @@ from bpy.props import BoolProperty
 
 from .. import preferences
 from ..outputs import writing
-from ..scene import curve_record, design_request
+from ..scene import avoided_curves, curve_order, curve_record, design_request
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
 from ..scene.surface import Surface, read
 from ..scene.viewports import redraw
 from . import time_slices
-from .long_solves import answer_all
+from .answers import answer_all
 from .sliced_operator import TIME_SLICE
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ class _Updates:
         self.requests: list[DesignRequest] = []
         self.curves: list[tuple[int, str]] = []  # session_uid and digest, for each request
         self.failed: dict[int, _Failure] = {}  # by the session_uid of the curve
+        self.n_objects: dict[str, int] = {}  # by the name of the scene
         self.is_reading = False
 
     def note(self, objects: set[int], everything: bool = False) -> None:
@@ -172,11 +173,14 @@ def _add_request(
         if key not in surfaces:
             surfaces[key] = read(mesh_object, settings.use_modifiers, traced=False)
         surface = surfaces[key]
-        now = curve_record.digest(mesh_object, surface, settings)
-        if curve_record.is_current(designed, now):
+        others = avoided_curves.above(designed, mesh_object, surface, settings)
+        now = curve_record.digest(mesh_object, surface, settings, others)
+        updated = {uid for uid, _ in _updates.curves}
+        follows = any(other.uid in updated for other in others)
+        if curve_record.is_current(designed, now) and not follows:
             _updates.failed.pop(uid, None)
             return
-        if uid in _updates.failed and _updates.failed[uid].digest == now:
+        if uid in _updates.failed and _updates.failed[uid].digest == now and not follows:
             return
         writing.check_replaceable(designed)
         traced = read(mesh_object, settings.use_modifiers)
@@ -192,10 +196,12 @@ def _write(work: time_slices.Work[list[Answer]]) -> None:
     """Write the new curves into their objects."""
     from ... import nicmm_core as nicmm
 
-    requests, curves = _updates.requests, _updates.curves
+    answers = work.result()
+    requests = design_request.resolved(_updates.requests, answers)
+    curves = _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
-    for request, (uid, before), answer in zip(requests, curves, work.result(), strict=True):
+    for request, (uid, before), answer in zip(requests, curves, answers, strict=True):
         designed, mesh_object = objects.get(uid), request.mesh_object()
         if designed is None or mesh_object is None:
             continue
@@ -205,7 +211,9 @@ def _write(work: time_slices.Work[list[Answer]]) -> None:
         _updates.failed.pop(uid, None)
         now = ""
         try:
-            now = curve_record.digest(mesh_object, request.surface, request.settings)
+            now = curve_record.digest(
+                mesh_object, request.surface, request.settings, request.others
+            )
             writing.check_replaceable(designed)
             request.check_unchanged()
             writing.replace(designed, request, answer)
@@ -245,7 +253,7 @@ def _live_scenes() -> list[bpy.types.Scene]:
 def _live_curves() -> list[bpy.types.Object]:
     found = {designed for scene in _live_scenes() for designed in scene.objects}
     designed = [each for each in found if curve_record.has_record(each)]
-    return sorted(designed, key=lambda each: each.name)
+    return sorted(designed, key=curve_order.position_of)
 
 
 @persistent
@@ -267,8 +275,12 @@ def note_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None
             or (update.is_updated_shading and update.id.mode == "SCULPT")
         )
     }
-    if objects:
-        _updates.note(objects)
+    # Blender does not report which object was deleted; it may be a curve that others avoid.
+    count = len(scene.objects)
+    has_other_objects = _updates.n_objects.get(scene.name, count) != count
+    _updates.n_objects[scene.name] = count
+    if objects or has_other_objects:
+        _updates.note(objects, everything=has_other_objects)
 
 
 @persistent

@@ -13,21 +13,32 @@ import bpy
 
 from ..scene import design_request
 from ..scene.design_request import DesignRequest
-from ..scene.messages import InputError
+from ..scene.lookup import by_uid
+from . import followers
+from .answers import answer_all, answer_now
 from .error_reports import with_error_reports
 from .partial_curve import PartialCurve
 from .sliced_operator import SlicedOperator
 
 if TYPE_CHECKING:
-    from ...nicmm_core.progress import Progress
     from ..scene.design_request import Answer
 
 
 class LongSolves(SlicedOperator[list["Answer"]]):
     """A mixin for operators with `requests(context)` and `finish(context, requests, answers)`.
 
-    Each answer is a `Design` of the core or an exception.
+    Each answer is a `Design` of the core or an exception. When the operator has finished, the
+    curves that avoid those it has changed follow, in the same undo step.
     """
+
+    changed_curves: tuple[int, ...] = ()
+    """The session_uids of the curve objects that `finish` has changed."""
+
+    waits = False
+    """Whether the operator returns only when everything is done."""
+
+    _following: followers.Following | None = None
+    """What is being designed again after the operator has finished."""
 
     _partial: PartialCurve | None = None
 
@@ -50,6 +61,7 @@ class LongSolves(SlicedOperator[list["Answer"]]):
         return with_error_reports(self, lambda: self.answer(context, self.requests(context)))
 
     def _all_at_once(self, context: bpy.types.Context) -> set[str]:
+        self.waits = True
         requests = self.requests(context)
         return self.end(context, requests, answer_now(context, requests))
 
@@ -59,6 +71,8 @@ class LongSolves(SlicedOperator[list["Answer"]]):
         return self.work_on(context, lambda progress: answer_all(requests, progress))
 
     def done(self, context: bpy.types.Context, answers: list[Answer]) -> set[str]:
+        if self._following is not None:
+            return self._end_following(context, answers)
         if self.is_sliced:
             for request in self._requests:
                 request.check_unchanged()
@@ -75,11 +89,43 @@ class LongSolves(SlicedOperator[list["Answer"]]):
             _include_all_data_in_undo()
         result: set[str] = set()
         try:
-            result = self.finish(context, requests, answers)
+            result = self.finish(context, design_request.resolved(requests, answers), answers)
+            if "FINISHED" in result and self.changed_curves:
+                result = self._follow(context)
         finally:
             if "RUNNING_MODAL" not in result:
                 vars(self).clear()
         return result
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Esc leaves the curves as they are that have not followed yet."""
+        if self._following is None or event.type != "ESC" or event.value != "PRESS":
+            return super().modal(context, event)
+        self._work.cancel()
+        self.tidy(context)
+        return with_error_reports(self, lambda: self.done(context, self._work.result()))
+
+    def _follow(self, context: bpy.types.Context) -> set[str]:
+        """Design the curves again that avoid changed ones."""
+        found = (by_uid(uid) for uid in self.changed_curves)
+        self._following = followers.following([each for each in found if each is not None])
+        requests = self._requests = self._following.requests
+        if self.waits or not requests:
+            answers = answer_now(context, requests) if requests else []
+            return self._end_following(context, answers)
+        self.has_handler = self.has_handler or self.is_sliced
+        return self.work_on(context, lambda progress: answer_all(requests, progress))
+
+    def _end_following(self, context: bpy.types.Context, answers: list[Answer]) -> set[str]:
+        """Write the curves that follow, and report those that cannot."""
+        assert self._following is not None
+        try:
+            remarks = followers.write(self._following.requests, answers)
+            if remarks := self._following.remarks + remarks:
+                self.report({"WARNING"}, "; ".join(remarks))
+        finally:
+            vars(self).clear()
+        return {"FINISHED"}
 
     def progress_text(self) -> str:
         return f"{round(100 * self._work.fraction)}%"
@@ -97,6 +143,7 @@ class LongSolves(SlicedOperator[list["Answer"]]):
         super().tidy(context)
         if self._partial is not None:
             self._partial.remove()
+            self._partial = None
 
 
 def _include_all_data_in_undo() -> None:
@@ -105,40 +152,6 @@ def _include_all_data_in_undo() -> None:
     Blender does so after a data-block has been created.
     """
     bpy.data.meshes.remove(bpy.data.meshes.new("NICMM"))
-
-
-def answer_now(context: bpy.types.Context, requests: list[DesignRequest]) -> list[Answer]:
-    """Answer requests, and show the progress at the mouse pointer."""
-    window_manager = context.window_manager
-    window_manager.progress_begin(0.0, 1.0)
-    try:
-        return answer_all(
-            requests, lambda fraction, _polyline: window_manager.progress_update(fraction)
-        )
-    finally:
-        window_manager.progress_end()
-
-
-def answer_all(requests: list[DesignRequest], progress: Progress) -> list[Answer]:
-    """Answer requests one after another, without access to Blender's data."""
-    from ... import nicmm_core as nicmm
-
-    answers: list[Answer] = []
-    for request in requests:
-        try:
-            design = design_request.answer(request, _part(progress, len(answers), len(requests)))
-        except (InputError, nicmm.NicmmError) as error:
-            answers.append(error)
-        else:
-            answers.append(design)
-            if design.status == nicmm.Status.CANCELLED:
-                break
-    return answers
-
-
-def _part(progress: Progress, done: int, total: int) -> Progress:
-    """The progress function for the next of `total` parts of the work, after `done` parts."""
-    return lambda fraction, polyline: progress((done + fraction) / total, polyline)
 
 
 def _current_index(fraction: float, count: int) -> int:

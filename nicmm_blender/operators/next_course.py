@@ -47,6 +47,7 @@ class NICMM_OT_next_course(CourseSearch, bpy.types.Operator):
         self.course = min(self.course, len(courses)) or following
         name = course_search.name_of(opened)
         edited_curve.rewrite(opened, opened.points, courses[self.course - 1].curves)
+        self.changed_curves = (opened.curve_uid,)
         self.report({"INFO"}, f'"{name}": course {self.course} of {len(courses)}{opened.remark}')
         return {"FINISHED"}
 

@@ -82,7 +82,10 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         total = len(requests) + len(self._failed)
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:
-                writing.replace(named(name), request, answer)
+                updated = named(name)
+                writing.replace(updated, request, answer)
+                if self.curve:  # otherwise all curves are updated anyway
+                    self.changed_curves = (updated.session_uid,)
             except InputError as error:
                 self._failed.append((name, str(error)))
         remarks = [f'"{name}": {message}' for name, message in self._failed]

@@ -14,8 +14,10 @@ import bpy
 import numpy as np
 
 from ..scene import (
+    avoided_curves,
     curve_record,
     design_request,
+    junctions,
     mesh_data,
     mirror_images,
     mirror_plane,
@@ -25,6 +27,7 @@ from ..scene import (
 from ..scene.control_points import ControlPoints
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
+from ..scene.junctions import OtherCurve
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.mirror_images import Images
@@ -72,6 +75,8 @@ class Opened:
         The mirror of the curve.
     image : SurfaceCurve of the core, or None
         The mirror image of the curve if the object has both.
+    others : tuple of OtherCurve
+        The curves that it avoids.
     """
 
     curve_uid: int
@@ -84,6 +89,7 @@ class Opened:
     remark: str
     mirror: Mirror | None = None
     image: SurfaceCurve | None = None
+    others: tuple[OtherCurve, ...] = ()
 
     @property
     def curves(self) -> list[SurfaceCurve]:
@@ -124,6 +130,14 @@ class Opened:
     def curve_object(self) -> bpy.types.Object | None:
         """The curve object; None for a new curve."""
         return by_uid(self.curve_uid) if self.curve_uid else None
+
+    @cached_property
+    def junctions(self) -> np.ndarray:
+        """Whether each control point lies on a curve that is avoided, (k,)."""
+        if not self.others or not len(self.points):
+            return np.zeros(len(self.points), dtype=bool)
+        mesh = surface_cache.core_mesh(self.surface)
+        return junctions.are_junctions(mesh, self.points.places, self.others)
 
     def positions(self) -> np.ndarray:
         """Positions of the control points in the object's local space, (k, 3)."""
@@ -200,17 +214,7 @@ def open_curve(
         Whether the curve keeps its course if only settings of `SAME_COURSE` differ. With any other
         change of settings it is designed from scratch, because another course may be the best one.
     """
-    from ... import nicmm_core as nicmm
-
-    if edited is None:
-        mesh_object = mesh_data.mesh_object(context)
-        if mesh_object is None:
-            raise InputError("Make a mesh or a designed curve active")
-        before = replace(curve_record.settings_from(context.scene.nicmm_curves), method="ELASTIC")
-    else:
-        mesh_object = curve_record.mesh_in_view_layer(context, edited)
-        writing.check_replaceable(edited)
-        before = curve_record.settings_of(edited)
+    mesh_object, before = _mesh_and_settings(context, edited)
     settings = before if settings is None else settings
     surface = surface_cache.get(mesh_object, settings.use_modifiers)
     if not len(surface.faces):
@@ -221,27 +225,38 @@ def open_curve(
         remarks.append(f"on the mesh without its {beyond}")
     if edited is not None:
         settings = _without_missing_maps(mesh_object, settings, remarks)
-    none = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    points = ControlPoints(none, np.zeros(0, dtype=bool))
-    via, curve, image = no_via_points(), None, None
-    mirror = mirror_plane.mirror_of(mesh_object, surface, settings)
-    if edited is not None:
-        via = curve_record.current_via_points(edited, mesh_object, surface)
-        points, moved = curve_record.current_control_points(edited, mesh_object, surface)
-        if moved:
-            points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
-            remarks.append(f"the mesh has changed: {points_moved}")
-        else:
-            kept = replace(settings, method=before.method)
-            for name in SAME_COURSE if keeps_course else ():
-                kept = kept.with_value(name, getattr(before, name))
-            if kept == before:
-                curve, image = _curves_of(edited, surface)
-    remark = "".join(f"; {each}" for each in remarks)
-    uid = 0 if edited is None else edited.session_uid
-    return Opened(
-        uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, mirror, image
+    via, elastic = no_via_points(), replace(settings, method="ELASTIC")
+    opened = Opened(
+        curve_uid=0 if edited is None else edited.session_uid,
+        mesh_uid=mesh_object.session_uid,
+        surface=surface,
+        settings=settings,
+        points=ControlPoints(via.points, np.zeros(0, dtype=bool)),
+        via=via,
+        curve=None,
+        remark="",
+        mirror=mirror_plane.mirror_of(mesh_object, surface, settings),
+        others=avoided_curves.above(edited, mesh_object, surface, elastic),
     )
+    if edited is not None:
+        kept = _settings_that_keep_the_curve(before, settings, keeps_course)
+        opened = _with_recorded_points(opened, edited, kept == before, remarks)
+    return replace(opened, remark="".join(f"; {each}" for each in remarks))
+
+
+def _mesh_and_settings(
+    context: bpy.types.Context, edited: bpy.types.Object | None
+) -> tuple[bpy.types.Object, CurveSettings]:
+    """The mesh object of a curve and its settings; those of the sidebar for a new curve."""
+    if edited is not None:
+        mesh_object = curve_record.mesh_in_view_layer(context, edited)
+        writing.check_replaceable(edited)
+        return mesh_object, curve_record.settings_of(edited)
+    mesh_object = mesh_data.mesh_object(context)
+    if mesh_object is None:
+        raise InputError("Make a mesh or a designed curve active")
+    panel = curve_record.settings_from(context.scene.nicmm_curves)
+    return mesh_object, replace(panel, method="ELASTIC")
 
 
 def _without_missing_maps(
@@ -256,13 +271,61 @@ def _without_missing_maps(
     return settings
 
 
+def _settings_that_keep_the_curve(
+    before: CurveSettings, settings: CurveSettings, keeps_course: bool
+) -> CurveSettings:
+    """Settings with the former values of those whose change keeps the curve."""
+    kept = replace(settings, method=before.method)
+    for name in SAME_COURSE if keeps_course else ():
+        kept = kept.with_value(name, getattr(before, name))
+    return kept
+
+
+def _with_recorded_points(
+    opened: Opened, edited: bpy.types.Object, keeps_curve: bool, remarks: list[str]
+) -> Opened:
+    """An opened curve with its control points and via points, and its curve if this is kept.
+
+    Control points that were moved to the nearest positions add a remark.
+    """
+    mesh_object, surface = opened.mesh_object, opened.surface
+    via = curve_record.current_via_points(edited, mesh_object, surface)
+    points, moved = curve_record.current_control_points(edited, mesh_object, surface)
+    curve, image = None, None
+    if moved:
+        points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
+        remarks.append(f"the mesh has changed: {points_moved}")
+    elif keeps_curve:
+        curve, image = _curves_of(edited, surface)
+    if opened.others:
+        points = _with_junctions(edited, surface, points, opened.others)
+    return replace(opened, points=points, via=via, curve=curve, image=image)
+
+
+def is_current(curve_object: bpy.types.Object, opened: Opened) -> bool:
+    """Whether an opened curve was designed on its surface as it is, with its present settings."""
+    now = curve_record.digest(opened.mesh_object, opened.surface, opened.settings, opened.others)
+    return curve_record.is_current(curve_object, now)
+
+
+def _with_junctions(
+    edited: bpy.types.Object,
+    surface: Surface,
+    points: ControlPoints,
+    others: tuple[OtherCurve, ...],
+) -> ControlPoints:
+    """Control points, with the junctions where they are now on the curves that are avoided."""
+    mesh, follows = surface_cache.core_mesh(surface), curve_record.junctions_of(edited)
+    return replace(points, places=junctions.followed(mesh, points.places, follows, others))
+
+
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
     settings = replace(edited.settings, method="ELASTIC")
     if not design_request.is_enough(edited.surface, edited.mirror, points, settings):
         return []
     found = design_request.for_drawing(
-        edited.mesh_object, edited.surface, points, edited.via, settings
+        edited.mesh_object, edited.surface, points, edited.via, settings, edited.curve_object
     )
     return [replace(found, start=edited.curve)]
 
@@ -322,6 +385,7 @@ def _record(
     curves: list[SurfaceCurve],
     drawn: Drawn | None,
 ) -> None:
+    points = snapped(edited, points)
     curve_settings = replace(edited.settings, method="ELASTIC")
     via = edited.via.fitting(*replace(edited, points=points).path)
     curve_record.write_record(
@@ -334,6 +398,7 @@ def _record(
         points.corners,
         points.places,
         via,
+        edited.others,
     )
 
 
@@ -394,6 +459,14 @@ def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> Vi
         along = _along_leg(edited, leg, via.points[divided])
         is_behind[divided] = along >= _along_leg(edited, leg, place)
     return via.after_insertion(number, count, closed, is_behind)
+
+
+def snapped(edited: Opened, points: ControlPoints) -> ControlPoints:
+    """Points, of which those that nearly lie on an avoided curve are put exactly onto it."""
+    if not edited.others or not len(points):
+        return points
+    mesh = surface_cache.core_mesh(edited.surface)
+    return replace(points, places=junctions.snapped(mesh, points.places, edited.others))
 
 
 def checked_leg(edited: Opened, leg: int) -> int:

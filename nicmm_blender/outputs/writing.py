@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +15,7 @@ import bmesh
 from ..scene import curve_record, mirror_images
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest, corners_of
+from ..scene.junctions import OtherCurve
 from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface
@@ -87,12 +89,13 @@ def apply(
     corners: np.ndarray,
     via: ViaPoints | None = None,
     mirror: Mirror | None = None,
+    others: Sequence[OtherCurve] = (),
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
     `settings` holds the output settings, `curve_settings` the settings of the curves, `corners`,
-    (k,), tells which of their control points are corners, without mirror images, and `via` are
-    their via points.
+    (k,), tells which of their control points are corners, without mirror images, `via` are their
+    via points, and `others` the curves that they avoid.
     """
     if settings.output in SEPARATE:
         new_object = as_object(mesh_object, surface, curves, settings, corners, mirror)
@@ -108,6 +111,7 @@ def apply(
             corners,
             controls,
             via,
+            others,
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
@@ -257,6 +261,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         corners,
         _controls(answer.curves, corners, mirror),
         request.via,
+        request.others,
     )
 
 

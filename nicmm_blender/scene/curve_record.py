@@ -11,7 +11,7 @@ that it comes from, because that face stays the same when the subdivision level 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -19,10 +19,12 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
-from . import mesh_data, mirror_plane, record_check, surface_cache
+from . import curve_order, junctions, mesh_data, mirror_plane, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .control_points import ControlPoints
-from .lookup import is_in
+from .curve_order import RECORD_KEY
+from .junctions import Junction, OtherCurve
+from .lookup import is_in, is_in_a_scene
 from .messages import InputError, check_finite
 from .record_check import Record
 from .surface import Surface, group_weights, read
@@ -35,16 +37,13 @@ if TYPE_CHECKING:
 CONTROL, VIA = "control_", "via_"
 """Beginnings of the names of the fields of control points and of via points."""
 
-RECORD_KEY = "nicmm_curve"
-"""Custom property of the object that holds the record."""
-
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
 VERSION = 5
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
 of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, those up
-to 3 have no via points, and those up to 4 no mirror."""
+to 3 have no via points, and those up to 4 no mirror, no rank and no junctions."""
 
 FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
 """Methods by their names in records of versions before 3."""
@@ -76,6 +75,7 @@ def property_name(option: Option) -> str:
 UNCHANGED = (
     ", use_modifiers=False",
     ", normal_bending=0.0",
+    ", avoid_others=False",
     ", mirror_axis='NONE'",
     ", mirror_as='JOINED'",
 )
@@ -103,9 +103,15 @@ class CurveSettings:
     obstacle_group: str = ""
     clearance: float = 0.0
     alignment_group: str = ""
+    avoid_others: bool = False
     use_modifiers: bool = True
     mirror_axis: str = mirror_plane.NONE
     mirror_as: str = mirror_plane.JOINED
+
+    @property
+    def avoids(self) -> bool:
+        """Whether the curve avoids the curves above it, which only one method can."""
+        return self.avoid_others and self.method == "ELASTIC"
 
     def __post_init__(self) -> None:
         """Raise an error if a setting is NaN or infinite."""
@@ -141,7 +147,8 @@ def arguments_of(
         values[option.name] = value
     for option in RECORDED:
         is_of_no_use = option.elastic_only and settings.method != "ELASTIC"
-        lacks = option.needs and all(values.get(name) is None for name in option.needs)
+        given = [name for name in option.needs if values.get(name) is not None]
+        lacks = option.needs and not given and not (settings.avoids and "avoid" in option.needs)
         if is_of_no_use or lacks:
             values[option.name] = option.default
     return values
@@ -164,6 +171,7 @@ def write_record(
     corners: np.ndarray,
     controls: SurfacePoints | None = None,
     via: ViaPoints | None = None,
+    others: Sequence[OtherCurve] = (),
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
@@ -176,7 +184,7 @@ def write_record(
     surface : Surface
         Its surface.
     curves : list of SurfaceCurve
-        The curves; empty for a drawing that has too few points for a curve.
+        The curves; empty for a drawing that has too few points.
     settings : CurveSettings
         Settings of the curves.
     drawn : dict or None
@@ -188,39 +196,84 @@ def write_record(
         Control points; by default those of the curves.
     via : ViaPoints, optional
         Via points; by default none.
+    others : sequence of OtherCurve
+        The curves that it was designed to avoid; control points on them are junctions.
     """
     if controls is None:
-        found = [curve.control_index[curve.control_index >= 0] for curve in curves]
-        pairs = list(zip(curves, found, strict=True))
-        control_faces = np.concatenate([curve.faces[index] for curve, index in pairs])
-        control_barycentric = np.concatenate([curve.barycentric[index] for curve, index in pairs])
-    else:
-        control_faces, control_barycentric = controls.faces, controls.barycentric
-    points = _points_to_store(CONTROL, surface, control_faces, control_barycentric)
-    if via is not None and len(via):
-        points["via_legs"] = via.legs.tolist()
-        points |= _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
+        controls = _control_points_of(curves)
     curve_object[RECORD_KEY] = {
         "version": VERSION,
+        curve_order.RANK: _rank_of(curve_object, mesh_object),
         "mesh": mesh_object,
         "cage": [] if surface.cage is None else list(surface.cage.sizes),
         "faces": surface.faces_digest,
         "triangles": surface.triangles_digest,
         "vertices": len(surface.local_positions),
+        **_curves_to_store(surface, curves),
+        **_points_to_store(CONTROL, surface, controls.faces, controls.barycentric),
+        **_via_points_to_store(surface, via),
+        "corner_points": corners.astype(int).tolist(),
+        **_junctions_to_store(surface, controls, others),
+        "asked": asdict(settings),
+        **({} if drawn is None else {"drawn": drawn}),
+    }
+    # Stored in the same data-block as the points, so that undo restores both together.
+    curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings, others)
+    surface_cache.note_change()
+
+
+def _curves_to_store(surface: Surface, curves: list[SurfaceCurve]) -> dict[str, list[float]]:
+    """Curves as a record stores them."""
+    return {
         "counts": [len(curve.faces) for curve in curves],
         "closed": [int(curve.closed) for curve in curves],
         "corners": _flat([surface.faces[curve.faces] for curve in curves]),
         "barycentric": _flat([curve.barycentric for curve in curves]),
         "control_counts": [len(curve.control_index) for curve in curves],
         "control_index": _flat([curve.control_index for curve in curves]),
-        **points,
-        "corner_points": corners.astype(int).tolist(),
-        "asked": asdict(settings),
-        **({} if drawn is None else {"drawn": drawn}),
     }
-    # Stored in the same data-block as the points, so that undo restores both together.
-    curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings)
-    surface_cache.note_change()
+
+
+def _via_points_to_store(surface: Surface, via: ViaPoints | None) -> dict[str, list[float]]:
+    """Via points as a record stores them; nothing if there are none."""
+    if via is None or not len(via):
+        return {}
+    points = _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
+    return {"via_legs": via.legs.tolist(), **points}
+
+
+def _rank_of(curve_object: bpy.types.Object, mesh_object: bpy.types.Object) -> int:
+    """The rank of a curve; that of a new one is below all curves of the mesh."""
+    if has_record(curve_object):
+        return curve_order.rank_of(curve_object)
+    return curve_order.next_rank(designed_on(mesh_object))
+
+
+def _control_points_of(curves: list[SurfaceCurve]) -> SurfacePoints:
+    """The control points that curves pass, as points of the core."""
+    from ... import nicmm_core as nicmm
+
+    found = [curve.control_index[curve.control_index >= 0] for curve in curves]
+    pairs = list(zip(curves, found, strict=True))
+    return nicmm.SurfacePoints(
+        np.concatenate([curve.faces[index] for curve, index in pairs]),
+        np.concatenate([curve.barycentric[index] for curve, index in pairs]),
+    )
+
+
+def _junctions_to_store(
+    surface: Surface, points: SurfacePoints, others: Sequence[OtherCurve]
+) -> dict[str, list[dict[str, Any]]]:
+    """The control points on other curves as a record stores them; nothing if there are none."""
+    if not others:
+        return {}
+    found = junctions.on_curves(surface_cache.core_mesh(surface), points, others)
+    return {"junctions": junctions.to_store(found)} if found else {}
+
+
+def junctions_of(curve_object: bpy.types.Object) -> list[Junction]:
+    """The control points of a curve that lie on other curves."""
+    return junctions.of_record(_checked_record(curve_object))
 
 
 def _points_to_store(
@@ -244,8 +297,16 @@ def _flat(arrays: list[np.ndarray]) -> list[float]:
     return [value for array in arrays for value in array.ravel().tolist()]
 
 
-def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSettings) -> str:
-    """A hash of everything that a curve depends on besides its control points."""
+def digest(
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    settings: CurveSettings,
+    others: Sequence[OtherCurve] = (),
+) -> str:
+    """A hash of everything that a curve depends on besides its control points.
+
+    `others` are the curves that it avoids; their order does not matter.
+    """
     # Digests in saved files must remain valid: the text begins with the first name of the class,
     # methods have their former names, and without modifiers it is that of version 1.
     former = {now: before for before, now in FORMER_METHODS.items()}
@@ -264,6 +325,8 @@ def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSetti
         if name in mesh_object.vertex_groups:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
             found.update(weights.tobytes())
+    for each in sorted(junctions.digest_of(other) for other in others):
+        found.update(each)
     return found.hexdigest()
 
 
@@ -323,6 +386,15 @@ def number_of_curves(curve_object: bpy.types.Object) -> int:
 def has_curve(curve_object: bpy.types.Object) -> bool:
     """Whether a designed curve has enough points for a curve."""
     return number_of_curves(curve_object) > 0
+
+
+def have_same_points(one: bpy.types.Object, other: bpy.types.Object) -> bool:
+    """Whether two objects have records of the same curve, as after duplicating one of them."""
+    first, second = one[RECORD_KEY], other[RECORD_KEY]
+    return all(
+        np.array_equal(np.asarray(first.get(name, ())), np.asarray(second.get(name, ())))
+        for name in ("corners", "barycentric")
+    )
 
 
 def is_unfinished(curve_object: bpy.types.Object) -> bool:
@@ -415,9 +487,21 @@ def lies_on(curve_object: bpy.types.Object, surface: Surface) -> bool:
 
 
 def designed_on(mesh_object: bpy.types.Object) -> list[bpy.types.Object]:
-    """All curve objects designed on a mesh object, sorted by name."""
-    found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
-    return sorted(found, key=lambda each: each.name)
+    """All curve objects designed on a mesh object, in their order; deleted ones are left out."""
+    found = [
+        each
+        for each in bpy.data.objects
+        if has_record(each) and mesh_of(each) == mesh_object and is_in_a_scene(each)
+    ]
+    return sorted(found, key=curve_order.position_of)
+
+
+def take_place_of(converted: bpy.types.Object, original: bpy.types.Object) -> None:
+    """Give a converted curve the rank of the original curve, and the junctions on it."""
+    curve_order.set_rank(converted, curve_order.rank_of(original))
+    for each in designed_on(mesh_of(original)):
+        if each.library is None:
+            junctions.point_to(each[RECORD_KEY], original, converted)
 
 
 def settings_of(curve_object: bpy.types.Object) -> CurveSettings:

@@ -8,6 +8,7 @@ slices (`operators.time_slices`).
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +16,10 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
-from . import curve_record, mirror_images, mirror_plane, surface_cache
+from . import avoided_curves, curve_record, junctions, mirror_images, mirror_plane, surface_cache
 from .control_points import ControlPoints
 from .curve_record import CurveSettings
+from .junctions import Junction, OtherCurve
 from .lookup import by_uid
 from .messages import InputError, user_message
 from .mirror_plane import Mirror
@@ -40,6 +42,9 @@ class DesignRequest:
     and the mirror of a curve that is joined to its mirror image. With a `leg`, only other courses
     of this leg of the start are sought. `moved` counts the control points that were moved to the
     nearest point of the surface because their triangles no longer exist.
+
+    `others` are the curves to avoid; the options have their curves, too. `junctions` are control
+    points that follow them. `curve_uid` is the session_uid of the curve object, 0 for a new one.
     """
 
     mesh_name: str
@@ -54,6 +59,9 @@ class DesignRequest:
     leg: int | None = None
     moved: int = 0
     mirror: Mirror | None = None
+    curve_uid: int = 0
+    others: tuple[OtherCurve, ...] = ()
+    junctions: tuple[Junction, ...] = ()
 
     def mesh_object(self) -> bpy.types.Object | None:
         """The mesh object, or None if it has been removed."""
@@ -87,6 +95,7 @@ def for_points(
     points: np.ndarray | SurfacePoints,
     order: str,
     settings: CurveSettings,
+    curve_object: bpy.types.Object | None = None,
 ) -> DesignRequest:
     """A request for a curve through points on a surface.
 
@@ -102,6 +111,8 @@ def for_points(
         Order of the control points, by the core's name.
     settings : CurveSettings
         Settings of the curve.
+    curve_object : bpy.types.Object, optional
+        The curve object; by default the curve is new.
     """
     if settings.method != "ELASTIC":  # other methods have no mirror
         settings = replace(settings, mirror_axis=mirror_plane.NONE)
@@ -112,8 +123,13 @@ def for_points(
     )
     options["clearance"] /= surface.unit
     if mirror is not None and mirror.joined:
+        if settings.avoids:
+            raise InputError(
+                "A curve that is joined to its mirror image cannot avoid other curves. Turn Avoid "
+                "Other Curves off, set Mirror As to Pair, or set Mirror to None"
+            )
         options["mirror"] = mirror.argument()
-    return DesignRequest(
+    request = DesignRequest(
         mesh_name=mesh_object.name,
         mesh_uid=mesh_object.session_uid,
         surface=surface,
@@ -122,7 +138,60 @@ def for_points(
         settings=settings,
         options=options,
         mirror=mirror,
+        curve_uid=0 if curve_object is None else curve_object.session_uid,
     )
+    return with_others(request, avoided_curves.above(curve_object, mesh_object, surface, settings))
+
+
+def with_others(request: DesignRequest, others: tuple[OtherCurve, ...]) -> DesignRequest:
+    """A request that avoids other curves, with its junctions on them."""
+    from ...nicmm_core.geometry.surface_points import locate_points
+
+    curves = [curve for other in others for curve in other.curves]
+    options = {**request.options, "avoid": curves or None}
+    if not others and options["obstacles"] is None:
+        options["clearance"] = 0.0
+    if not curves:
+        return replace(request, options=options, others=others)
+    mesh = surface_cache.core_mesh(request.surface)
+    given = locate_points(mesh, request.points, "control_points")
+    points = junctions.followed(mesh, given, request.junctions, others)
+    points = junctions.snapped(mesh, points, others)
+    if points is given:  # messages name vertices that were given
+        return replace(request, options=options, others=others)
+    return replace(request, points=points, options=options, others=others)
+
+
+NewCurves = dict[int, "tuple[SurfaceCurve, ...]"]
+"""Curves that were designed anew, by the session_uid of their objects."""
+
+
+def resolved(requests: Sequence[DesignRequest], answers: Sequence[Answer]) -> list[DesignRequest]:
+    """Requests that were answered one after another, with the curves that each of them avoided."""
+    designed: NewCurves = {}
+    found = []
+    for request, answer in zip(requests, answers, strict=False):  # the rest was cancelled
+        found.append(with_new_curves(request, designed))
+        designed |= new_curves(request, answer)
+    return found + list(requests[len(found) :])
+
+
+def new_curves(request: DesignRequest, answer: Answer) -> NewCurves:
+    """The curves in the answer to a request for an existing object; empty if there are none."""
+    if not request.curve_uid or isinstance(answer, Exception) or not answer.curves:
+        return {}
+    return {request.curve_uid: tuple(answer.curves)}
+
+
+def with_new_curves(request: DesignRequest, designed: NewCurves) -> DesignRequest:
+    """A request that avoids new curves instead of the former ones of their objects."""
+    if not any(other.uid in designed for other in request.others):
+        return request
+    others = (
+        OtherCurve(other.uid, other.name, designed[other.uid]) if other.uid in designed else other
+        for other in request.others
+    )
+    return with_others(request, tuple(others))
 
 
 def for_drawing(
@@ -131,9 +200,10 @@ def for_drawing(
     points: ControlPoints,
     via: ViaPoints,
     settings: CurveSettings,
+    curve_object: bpy.types.Object | None = None,
 ) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
-    request = for_points(mesh_object, surface, points.places, "given", settings)
+    request = for_points(mesh_object, surface, points.places, "given", settings, curve_object)
     total, mirror = len(points), request.mirror
     if mirror is not None and mirror.joined:
         total = mirror_images.half_of(surface, mirror, points.places).total
@@ -192,7 +262,10 @@ def for_curve(
     if not is_enough(surface, mirror, points, settings):
         raise InputError(curve_record.no_curve_message(curve_object))
     via = curve_record.current_via_points(curve_object, mesh_object, surface)
-    request = for_drawing(mesh_object, surface, points, via, settings)
+    request = for_drawing(mesh_object, surface, points, via, settings, curve_object)
+    if request.others:
+        follows = tuple(curve_record.junctions_of(curve_object))
+        request = with_others(replace(request, junctions=follows), request.others)
     start = None
     if settings.method == "ELASTIC" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
@@ -211,7 +284,9 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
     """Design the curve with the core, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 
-    settings = request.settings
+    for other in request.others:
+        if other.problem:
+            raise InputError(other.problem)
     with surface_cache.designer_of(request.surface) as designer:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
@@ -227,15 +302,22 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
             surface_cache.store_design(request.surface, design)
             return with_image(designer, request, design)
         except nicmm.NicmmError as error:
-            vertices = request.points if isinstance(request.points, np.ndarray) else None
-            at = vertices if vertices is not None and vertices.ndim == 1 else None
-            raise InputError(user_message(error, settings.obstacle_group, at)) from error
+            raise InputError(message_of(error, request)) from error
+
+
+def message_of(error: Exception, request: DesignRequest) -> str:
+    """The message for the user about an error of the core."""
+    vertices = request.points if isinstance(request.points, np.ndarray) else None
+    at = vertices if vertices is not None and vertices.ndim == 1 else None
+    avoided = [other.name for other in request.others for _ in other.curves]
+    return user_message(error, request.settings.obstacle_group, at, avoided)
 
 
 def with_image(designer: Designer, request: DesignRequest, design: Design) -> Design:
     """A design with the mirror image as a second curve, if the request asks for a pair.
 
-    Alternatives whose mirror images do not exist are left out.
+    The image has to avoid the same curves. Alternatives whose mirror images do not, or do not
+    exist, are left out.
     """
     from ... import nicmm_core as nicmm
 
@@ -243,9 +325,11 @@ def with_image(designer: Designer, request: DesignRequest, design: Design) -> De
     if mirror is None or mirror.joined or len(design.curves) != 1:
         return design
     image = designer.mirrored(design, mirror.argument())
+    if request.options["avoid"]:
+        designer.check_avoids(image, request.options["avoid"], request.options["clearance"])
     alternatives = []
     for each in design.alternatives:
-        with contextlib.suppress(nicmm.CurveError):
+        with contextlib.suppress(nicmm.CurveError, nicmm.UnreachableError):
             alternatives.append(with_image(designer, request, each))
     return replace(design, curves=[*design.curves, *image.curves], alternatives=alternatives)
 

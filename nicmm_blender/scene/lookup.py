@@ -17,3 +17,15 @@ def is_in(view_layer: bpy.types.ViewLayer, candidate: bpy.types.Object) -> bool:
     objects = view_layer.objects
     named = objects.get(candidate.name)
     return named == candidate or (named is not None and any(each == candidate for each in objects))
+
+
+def is_in_a_scene(candidate: bpy.types.Object) -> bool:
+    """Whether any scene contains an object.
+
+    Blender keeps a deleted object while a custom property refers to it.
+    """
+    return any(
+        named == candidate or (named is not None and any(each == candidate for each in objects))
+        for objects in (scene.objects for scene in bpy.data.scenes)
+        for named in [objects.get(candidate.name)]
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,6 +17,10 @@ MIRROR_WORDS = {
     "side, since their mirror images are added",
     "leave mirror out": "set Mirror to None",
     "the mirror image of design": "the mirror image of the curve",
+    "design crosses": "the mirror image of the curve crosses",
+    "design comes closer": "the mirror image of the curve comes closer",
+    "move control points so that it stays on one side, or leave the other curve out": "move the "
+    "points, turn Avoid Other Curves off, or set Mirror to None and draw both curves",
     "pass another plane": "choose another mirror",
     "about plane; design a curve through the mirror images of its control points instead": "about "
     "the mirror; set Mirror to None and draw both curves",
@@ -35,11 +40,15 @@ def check_finite(name: str, value: object) -> None:
 
 
 def user_message(
-    error: Exception, obstacle_group: str = "", vertices: np.ndarray | None = None
+    error: Exception,
+    obstacle_group: str = "",
+    vertices: np.ndarray | None = None,
+    avoided: Sequence[str] = (),
 ) -> str:
     """Reword a message of the core: points are counted from 1, and the obstacle map is named.
 
-    `vertices` are the vertex indices of the control points, or None if they are not at vertices.
+    `vertices` are the vertex indices of the control points, or None if they are not at vertices,
+    and `avoided` the names of the curves that are avoided.
     """
     text = str(error)
     for point in getattr(error, "points", ()):
@@ -61,7 +70,19 @@ def user_message(
         text += ". Turn Closed off for an open curve, which needs 2"
     if type(error).__name__ == "UnreachableError" and obstacle_group:
         text += f' (obstacles: the vertex group "{obstacle_group}")'
+    if avoided:
+        text = _with_names(text, avoided)
     return sentence(text)
+
+
+def _with_names(text: str, avoided: Sequence[str]) -> str:
+    """A message about curves to avoid, in words of the interface."""
+    text = re.sub(r"avoid\[(\d+)\]", lambda found: f'"{avoided[int(found[1])]}"', text)
+    # The number is a length in the space of the mesh, unlike that of the setting.
+    text = re.sub(r"the clearance \([^)]*\)", "the clearance", text)
+    text = text.replace("the curves of avoid", "the curves above it in the list")
+    text = text.replace("a curve of avoid", "a curve above it in the list")
+    return re.sub("^avoid leaves", "the curves above it in the list leave", text)
 
 
 def sentence(text: str) -> str:

@@ -74,6 +74,7 @@ def _check_points(record: Record) -> None:
         legs = _whole(record, "via_legs", _check_stored(record, "via_"), least=0)
         if (np.diff(legs) < 0).any() or (legs >= count).any():
             raise _DamagedError("a via point is on a leg that does not exist")
+    _check_junctions(record, count)
     if not len(counts) and (len(closed) or len(control_counts)):
         raise _DamagedError("it has settings of a curve but no curve")
 
@@ -100,6 +101,26 @@ def _check_mirror(record: Record, count: int, control_counts: np.ndarray) -> Non
         )
     if not fits:
         raise _DamagedError("its curve does not fit its control points and its mirror")
+
+
+def _check_junctions(record: Record, count: int) -> None:
+    """Check the junctions among the control points, and the rank."""
+    rank = record.get("rank", 0)
+    if not isinstance(rank, int):
+        raise _DamagedError(f"its rank is {rank!r}")
+    stored = record.get("junctions", ())
+    if isinstance(stored, str) or not hasattr(stored, "__iter__"):
+        raise _DamagedError("junctions is not a list")
+    for junction in stored:
+        if not is_group(junction):
+            raise _DamagedError("a junction is not a group of properties")
+        values = [junction.get(name) for name in ("point", "part", "leg", "legs")]
+        if not all(isinstance(value, int) and value >= 0 for value in values):
+            raise _DamagedError("a junction has no valid indices")
+        point, _part, leg, legs = values
+        share = junction.get("share")
+        if point >= count or leg >= legs or not _is_finite(share) or not 0.0 <= share <= 1.0:
+            raise _DamagedError("a junction is at a place that does not exist")
 
 
 def _check_stored(record: Record, kind: str) -> int:

@@ -37,6 +37,9 @@ class ChangesPoints(LongSolves):
     searches_course = False
     """Whether the change selects a course, which is searched for; otherwise the curve keeps its."""
 
+    snaps = True
+    """Whether a dragged point snaps to curves that the curve avoids."""
+
     curve: str
     index: int
     position: Sequence[float]
@@ -67,7 +70,8 @@ class ChangesPoints(LongSolves):
         """The curve after the change, before it is designed."""
         curve = None if self.searches_course else opened.curve
         via = self.changed_via(opened)
-        return replace(opened, points=self.changed(opened), via=via, curve=curve)
+        points = edited_curve.snapped(opened, self.changed(opened))
+        return replace(opened, points=points, via=via, curve=curve)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -96,6 +100,7 @@ class ChangesPoints(LongSolves):
         edited = self._edited
         result = edited_curve.write(context, edited, edited.points, curves, _Output(panel))
         modes.make_active(context, result)
+        self.changed_curves = (result.session_uid,)
         if remark:
             count = len(edited.points)
             kind = {"WARNING"} if edited.remark else {"INFO"}

@@ -120,7 +120,7 @@ def _call_of(
         return calls.add_via_point, {**named, "leg": hit.index - 1}
     if hit.kind is Kind.CURVE:
         return calls.activate_curve, {"curve": hit.name}
-    if hit.kind is Kind.SURFACE:
+    if hit.kind in {Kind.SURFACE, Kind.JUNCTION}:
         return calls.add_point, named
     operator = calls.move_point if hit.kind is Kind.POINT else calls.insert_point
     return operator, {**named, "index": hit.index}

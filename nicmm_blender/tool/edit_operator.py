@@ -9,9 +9,10 @@ import numpy as np
 
 from .. import settings
 from ..operators import polls
+from ..operators.answers import answer_now
 from ..operators.asymmetry_report import asymmetry_text
 from ..operators.error_reports import with_error_reports
-from ..operators.long_solves import answer_now
+from ..operators.followers import follow_now
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, selection
@@ -111,6 +112,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         layout.prop(self, "use_modifiers")
         for name in edited_curve.MAPS:
             layout.prop_search(self, name, mesh_object, "vertex_groups")
+        settings.draw_avoid_others(layout, self)
         layout.prop(self, "clearance")
         if not self.curve:
             for name in ("output", *OBJECT_SETTINGS):
@@ -160,15 +162,17 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             points = replace(points, corners=selection.given_corners(self.corners, len(points)))
         if len(self.via_points):  # they select the course, so it is searched for
             opened = replace(opened, via=self._given_via_points(opened), curve=None)
-        if len(self.points) or changes_corners or opened.curve is None:
+        is_outdated = edited is not None and not edited_curve.is_current(edited, opened)
+        if len(self.points) or changes_corners or is_outdated or opened.curve is None:
             design = _design(context, opened, points)
             curves, remark = design.curves, asymmetry_text(context.scene, opened.surface, design)
         else:
             curves, remark = opened.curves, ""
         result = edited_curve.write(context, opened, points, curves, self)
         self._store(opened, points)
-        remark = f"{remark}{opened.remark}"
-        self.report({"INFO"}, f'"{result.name}" through {len(points)} points{remark}')
+        report = f'"{result.name}" through {len(points)} points{remark}{opened.remark}'
+        remarks = follow_now(context, [result])
+        self.report({"WARNING" if remarks else "INFO"}, "; ".join([report, *remarks]))
         return {"FINISHED"}
 
     def _given_via_points(self, opened: Opened) -> ViaPoints:

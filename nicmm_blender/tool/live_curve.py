@@ -11,8 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..scene import design_request, surface_cache
-from ..scene.design_request import DesignRequest
-from ..scene.messages import user_message
+from ..scene.design_request import DesignRequest, message_of
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfaceCurve
@@ -115,7 +114,7 @@ class LiveCurve:
         except nicmm.CurveError:
             self.waiting, self.steps_left = True, 0
         except nicmm.NicmmError as error:
-            self.problem, self.steps_left = user_message(error, request.settings.obstacle_group), 0
+            self.problem, self.steps_left = message_of(error, request), 0
         else:
             self.request, self.problem = replace(request, start=design), ""
             self.image = image[0] if image else None

@@ -289,17 +289,17 @@ def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_M
     def fill(kind: Kind, index: int, is_image: bool = False) -> Colour:
         return colours.hover if hovered_is == (kind, index, is_image) else colours.point
 
-    corners, marks = opened.points.corners, []
+    corners, junctions, marks = opened.points.corners, opened.junctions, []
     for number, position in enumerate(opened.positions()):
-        shapes = _SQUARES if corners[number] else _DISCS
+        shapes = _SHAPES[bool(corners[number]), bool(junctions[number])]
         marks.append(_Mark(position, shapes, fill(Kind.POINT, number)))
     for owner, position in zip(opened.images.owners, opened.image_positions(), strict=True):
         shapes = _HOLLOW_SQUARES if corners[owner] else _HOLLOW_DISCS
         marks.append(_Mark(position, shapes, fill(Kind.POINT, owner, True), IMAGE))
     for number, position in enumerate(opened.via_positions()):
         marks.append(_Mark(position, _RINGS, fill(Kind.VIA, number)))
-    if hit is not None and hit.kind in {Kind.LINE, Kind.SURFACE}:
-        marks.append(_Mark(hit.position, _SMALL_DISCS, colours.hover))
+    if hit is not None and hit.kind in _SHAPES_OF_NEW_POINTS:
+        marks.append(_Mark(hit.position, _SHAPES_OF_NEW_POINTS[hit.kind], colours.hover))
     return marks
 
 
@@ -347,6 +347,29 @@ _DISCS, _HOLLOW_DISCS = (_outlined(_ring, hole, POINT_RADIUS) for hole in (0.0, 
 _SMALL_DISCS = 0.6 * _DISCS[0], 0.6 * _DISCS[1]  # where a click would add a point
 _SQUARES, _HOLLOW_SQUARES = (_outlined(_square, hole, POINT_RADIUS) for hole in (0.0, IMAGE_HOLE))
 _RINGS = _outlined(_ring, HOLE_RADIUS, RING_RADIUS)
+_TURN = np.array([[1.0, 1.0], [-1.0, 1.0]])
+"""A turn by 45 degrees that enlarges by the square root of 2, so that a diamond is as wide as a
+disc with a rim."""
+_DIAMONDS = _SQUARES[0] @ _TURN, _SQUARES[1] @ _TURN
+_STARS = tuple(
+    np.concatenate([square, diamond / np.sqrt(2.0)])
+    for square, diamond in zip(_SQUARES, _DIAMONDS, strict=True)
+)
+
+_SHAPES = {
+    (False, False): _DISCS,
+    (True, False): _SQUARES,
+    (False, True): _DIAMONDS,
+    (True, True): _STARS,
+}
+"""Shapes of control points, by whether they are corners and whether they lie on other curves."""
+
+_SHAPES_OF_NEW_POINTS = {
+    Kind.LINE: _SMALL_DISCS,
+    Kind.SURFACE: _SMALL_DISCS,
+    Kind.JUNCTION: _DIAMONDS,
+}
+"""Shapes of the mark where a click would add a point, by what is under the mouse."""
 
 
 def towards_the_eye(

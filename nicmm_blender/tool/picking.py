@@ -18,14 +18,14 @@ from ..operators import polls
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, mirror_images, surface_cache
-from ..scene.lookup import is_in
+from ..scene.lookup import by_uid, is_in
 from ..scene.messages import InputError
 from ..scene.surface import Surface
 from . import mirror_snap
 from .view import View, view_of
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
@@ -40,6 +40,7 @@ class Kind(Enum):
     POINT = auto()
     VIA = auto()
     LINE = auto()
+    JUNCTION = auto()
     CURVE = auto()
     SURFACE = auto()
 
@@ -56,8 +57,8 @@ class Hit:
         Name of the curve object; empty for a new curve.
     index : int
         Index of the control point or of the via point; on the line, index of the control point
-        before which a new one is inserted; on the surface, number of control points; 0 for another
-        curve.
+        before which a new one is inserted; on the surface, and on a curve that the active one
+        avoids, number of control points; 0 for another curve.
     position : tuple
         Position in the local space of the mesh object.
     mesh_uid : int
@@ -232,6 +233,9 @@ def _hit(
         on_line = view.nearest_on_line(pixel, positions_along, reach, radius)
         if on_line is not None:
             return _on_line(opened, each, view, name, scale, *on_line)
+    if curve is not None and (place := junction_at(context, view, pixel, opened)) is not None:
+        position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
+        return Hit(Kind.JUNCTION, name, len(positions), position, opened.mesh_uid)
     for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
@@ -244,6 +248,36 @@ def _hit(
         place = mirror_snap.snapped(view, opened, place, scale)
     position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
     return Hit(Kind.SURFACE, name, len(positions), position, opened.mesh_uid)
+
+
+def junction_at(
+    context: bpy.types.Context, view: View, pixel: np.ndarray, opened: Opened
+) -> SurfacePoints | None:
+    """The point of a curve that the given one avoids near a pixel; None if there is none.
+
+    Control points of that curve are preferred to other points of it.
+    """
+    from ...nicmm_core.geometry.curve import points_of
+    from ...nicmm_core.geometry.curve_places import nearest_point
+
+    reach = CURVE_REACH * context.preferences.system.ui_scale
+    for other in opened.others:
+        shown = by_uid(other.uid)
+        if shown is None or not _is_shown(context, shown):
+            continue
+        radius = radius_of(shown, opened.surface)
+        for curve in other.curves:
+            line = edited_curve.polyline_of(opened.surface, curve)
+            controls = curve.control_index[curve.control_index >= 0]
+            number = view.nearest_point(pixel, line[controls], reach)
+            if number is not None:
+                return points_of(curve)[controls[[number]]]
+            on_line = view.nearest_on_line(pixel, line, reach, radius)
+            if on_line is not None:
+                segment, share = on_line
+                position = (1.0 - share) * line[segment] + share * line[segment + 1]
+                return nearest_point(view.mesh, curve, opened.surface.local_to_core @ position)[0]
+    return None
 
 
 def _on_line(

@@ -15,8 +15,8 @@ import bpy
 import numpy as np
 
 from ..operators import time_slices
+from ..operators.answers import answer_all
 from ..operators.error_reports import with_error_reports
-from ..operators.long_solves import answer_all
 from ..operators.sliced_operator import TIME_SLICE
 from ..outputs import edited_curve, writing
 from ..outputs.edited_curve import Opened
@@ -139,7 +139,11 @@ class PointDrag(ChangesPoints):
         self._pressed = np.full(2, np.nan)  # from now on every move counts, even back to the start
         self._last_move = time.monotonic()
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
-        place = self._view.surface_point_at(pixel + self._grip)
+        place = None
+        if self.snaps and not getattr(self, "image", False):  # others are avoided by the curve
+            place = picking.junction_at(context, self._view, pixel + self._grip, self._opened)
+        if place is None:
+            place = self._view.surface_point_at(pixel + self._grip)
         if place is None:
             return
         if self.may_be_on_plane(self._opened):
@@ -214,6 +218,13 @@ class PointDrag(ChangesPoints):
         finally:
             if "RUNNING_MODAL" not in result:
                 overlay.show_active()
+        return result
+
+    def finish(
+        self, context: bpy.types.Context, requests: list[DesignRequest], answers: list[Answer]
+    ) -> set[str]:
+        result = super().finish(context, requests, answers)
+        overlay.show_active()  # other curves may still follow
         return result
 
     def tidy(self, context: bpy.types.Context) -> None:

@@ -150,6 +150,7 @@ class NICMM_OT_add_via_point(PointDrag, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     searches_course = True
+    snaps = False
 
     curve: CURVE
     leg: bpy.props.IntProperty(
@@ -185,6 +186,7 @@ class NICMM_OT_move_via_point(PointDrag, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     searches_course = True
+    snaps = False
 
     curve: CURVE
     index: VIA_INDEX

@@ -205,6 +205,15 @@ def checked_curve(
     return curve, _segment_faces(mesh, curve, across_gaps)
 
 
+def lies_on(mesh: Mesh, curve: SurfaceCurve) -> bool:
+    """Whether consecutive points of a curve have a common face."""
+    try:
+        checked_curve(mesh, curve)
+    except CurveError:
+        return False
+    return True
+
+
 def weights_in_faces(
     mesh: Mesh, faces: IntArray, barycentric: FloatArray, others: IntArray
 ) -> FloatArray:

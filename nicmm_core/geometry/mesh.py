@@ -92,11 +92,7 @@ class Mesh:
         Side 3 f + j is opposite corner j of face f. At a boundary edge, or at an edge of more than
         two faces, the entry is the side itself.
         """
-        order, first, count = grouped(side_keys(self.faces))
-        one, other = order[first[count == 2]], order[first[count == 2] + 1]
-        sides = np.arange(self.faces.size)
-        sides[one], sides[other] = other, one
-        return sides
+        return opposite_sides(self.faces)
 
     @cached_property
     def face_neighbours(self) -> IntArray:
@@ -261,6 +257,18 @@ def area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Normals whose lengths are twice the areas of the faces, shape (F, 3)."""
     origin, one, other = (np.take(vertices, corner, axis=0) for corner in faces.T)
     return np.ascontiguousarray(cross((one - origin).T, (other - origin).T).T)
+
+
+def opposite_sides(faces: IntArray) -> IntArray:
+    """For each side of faces, (F, 3), the same edge as a side of the adjacent face, (3 F,).
+
+    Where an edge has not two faces, it is the side itself.
+    """
+    order, first, count = grouped(side_keys(faces))
+    one, other = order[first[count == 2]], order[first[count == 2] + 1]
+    sides = np.arange(faces.size)
+    sides[one], sides[other] = other, one
+    return sides
 
 
 def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:

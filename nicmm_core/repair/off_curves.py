@@ -19,15 +19,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..errors import ControlPointError, CurveError, PointName, UnreachableError
+from ..errors import ArgumentError, ControlPointError, CurveError, PointName, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
 from ..geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
-from ..geometry.mesh import Mesh, edge_keys, edge_lengths, side_keys
+from ..geometry.mesh import Mesh, edge_keys, edge_lengths, opposite_sides, side_keys
 from ..geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
 from ..geometry.surface_points import SurfacePoints
 from ..outputs.cut import CutMesh, cut_mesh
@@ -41,10 +43,11 @@ from .removed_faces import points_at
 FADE = 2.0
 """Length of an avoided curve, on either side of a junction, without clearance; in clearances."""
 
-LEVEL = 0.992
+LEVEL = 1.02
 """Distance at which the surface is divided, in clearances.
 
-The distance that is kept differs from it by up to `SNAP` and about `ERROR`."""
+The distance that is kept differs from it by up to `SNAP` and about `ERROR`, so it is not less than
+the clearance."""
 
 COARSEST = 2.0
 """Greatest longest edge of the faces that are divided at the clearance, in clearances."""
@@ -52,19 +55,20 @@ COARSEST = 2.0
 FINEST = 1.0 / 16.0
 """Length of an edge up to which faces are accurate enough in any case, in clearances."""
 
-ERROR = 0.003
+ERROR = 0.012
 """Greatest error of distances that are interpolated on these faces, at their centroids and in the
 middle of their sides, in clearances. Faces with greater errors are bisected further."""
 
-SNAP = 0.008
+SNAP = 0.006
 """Distance up to which the line at the clearance is moved to a vertex, in clearances."""
 
 MEETING = 1e-8
 """Greatest distance between a control point and the place at which the curve may meet an avoided
 curve, in bounding-box diagonals."""
 
-REACH = 3.2
-"""Distance up to which distances are computed, in clearances."""
+REACH = 1.25
+"""Distance beyond the line up to which distances are computed, in lengths of the longest edge of
+the faces there, if that is at most `COARSEST`."""
 
 RINGS = 3
 """Number of rings of faces, around those within reach, that may be bisected with them."""
@@ -222,7 +226,7 @@ def surface_off_curves(
         near = [_with_clearance(mapped, each, clearance) for each in avoided]
         segments = joined_segments(near)
         if len(segments):
-            distances = SegmentDistances(mesh, segments, REACH * clearance)
+            distances = _distances(mesh, segments, clearance)
             parts, vertices = _beyond(distances, parts, vertices, clearance)
     if not len(parts.faces):
         return None
@@ -289,15 +293,53 @@ def check_off_curves(
 
 def check_not_crossed(mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]) -> None:
     """Raise UnreachableError if a curve meets avoided curves elsewhere than at junctions."""
-    points = curve.points[curve.control_index[curve.control_index >= 0]]
     for number, each in enumerate(avoided):
-        meeting = meeting_places(mesh, curve, each.curve)
-        away = cdist(meeting, points).min(axis=1, initial=np.inf)
-        if (away > MEETING * mesh.diagonal).any():
+        if meets(mesh, curve, each):
             raise UnreachableError(
                 f"the curve would cross avoid[{number}]; move control points away from it, or use "
                 "a larger clearance"
             )
+
+
+def meets(mesh: Mesh, curve: SurfaceCurve, avoided: Avoided) -> bool:
+    """Whether a curve meets an avoided curve elsewhere than at junctions."""
+    points = curve.points[curve.control_index[curve.control_index >= 0]]
+    meeting = meeting_places(mesh, curve, avoided.curve)
+    away = cdist(meeting, points).min(axis=1, initial=np.inf)
+    return bool((away > MEETING * mesh.diagonal).any())
+
+
+def is_too_close(
+    mapped: MappedMesh, curve: SurfaceCurve, avoided: Avoided, clearance: float
+) -> bool:
+    """Whether a curve comes closer to an avoided curve than the clearance.
+
+    Parameters
+    ----------
+    mapped : MappedMesh
+        Map from the given mesh to a manifold.
+    curve : SurfaceCurve
+        A curve on the manifold. Its points and the middles of its segments count.
+    avoided : Avoided
+        A curve on the given mesh.
+    clearance : float
+        It does not count near junctions.
+    """
+    segments = _with_clearance(mapped, avoided, clearance)
+    if not len(segments):
+        return False
+    curve, faces = checked_curve(mapped.mesh, curve, across_gaps=True)
+    faces = faces if curve.closed else faces[:-1]
+    index = np.arange(len(faces))
+    start, end = (
+        weights_in_faces(mapped.mesh, curve.faces[ends], curve.barycentric[ends], faces)
+        for ends in (index, (index + 1) % len(curve.faces))
+    )
+    distances = _distances(mapped.mesh, segments, clearance)
+    return any(
+        bool((distances.at(SurfacePoints(faces, weights)) < clearance).any())
+        for weights in (start, 0.5 * (start + end), end)
+    )
 
 
 def _with_clearance(mapped: MappedMesh, avoided: Avoided, clearance: float) -> FaceSegments:
@@ -347,6 +389,24 @@ def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
     return FaceSegments(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))
 
 
+def _distances(mesh: Mesh, segments: FaceSegments, clearance: float) -> SegmentDistances:
+    """Distances from the segments as far as they are needed."""
+    # A straight distance is not greater than a distance along the surface.
+    longest = _side_lengths(mesh.vertices, mesh.faces).max(axis=1)
+    away, _ = cKDTree(np.concatenate(segments.positions(mesh))).query(
+        mesh.vertices, distance_upper_bound=LEVEL * clearance + longest.max()
+    )
+    near = away[mesh.faces].min(axis=1) <= LEVEL * clearance + longest
+    longest = min(longest[near].max(initial=0.0), COARSEST * clearance)
+    try:
+        return SegmentDistances(mesh, segments, LEVEL * clearance + REACH * longest)
+    except nicmm_kernels.TooManyWindowsError as error:
+        raise ArgumentError(
+            f"clearance is {clearance:g}, which reaches over too many faces of this mesh; use a "
+            "smaller one"
+        ) from error
+
+
 def _beyond(
     distances: SegmentDistances, parts: FaceParts, vertices: FloatArray, clearance: float
 ) -> tuple[FaceParts, FloatArray]:
@@ -361,94 +421,43 @@ def _beyond(
     fixed = np.zeros(len(vertices), dtype=bool)
     fixed[others.faces] = True
 
-    level, values = LEVEL * clearance, np.full(len(vertices), np.nan)
-    values = _evaluated(distances, parts, values)
-    accurate = np.zeros(len(parts.faces), dtype=bool)
-    while True:
-        checkpoint()
-        lengths = _side_lengths(vertices, parts.faces)
-        longest, at_corners = lengths.max(axis=1), values[parts.faces]
-        large = longest > COARSEST * clearance
-        # On a small face, the line may cross a side without enclosing an end of it; if it is an arc
-        # about a point, it reaches this far into the face.
-        margin = np.where(large, longest, longest**2 / (8.0 * clearance))
-        straddles = (at_corners.min(axis=1) <= level + margin) & (
-            at_corners.max(axis=1) >= level - margin
-        )
-        straddles &= reached[parts.parent]
-        check = np.flatnonzero(straddles & ~large & ~accurate)
-        accurate[check] = _errors(distances, parts.taken(check), at_corners[check]) <= (
-            ERROR * clearance
-        )
-        accurate |= longest <= FINEST * clearance
-        straddles &= ~accurate
-        if not straddles.any():
-            break
-        before = parts
-        parts, vertices = _bisected(parts, vertices, lengths, straddles, fixed)
-        count = len(before.faces)
-        accurate &= (parts.faces[:count] == before.faces).all(axis=1)
-        accurate = np.append(accurate, np.zeros(len(parts.faces) - count, dtype=bool))
-        unknown = np.full(len(vertices) - len(values), np.nan)
-        values = _evaluated(distances, parts, np.append(values, unknown))
-        fixed = np.append(fixed, np.zeros(len(vertices) - len(fixed), dtype=bool))
-    parts, vertices = _kept(parts, vertices, values - level, SNAP * clearance)
+    level = LEVEL * clearance
+    refined = nicmm_kernels.refine_at_level(
+        distances.paths,
+        nicmm_kernels.PartArrays(
+            np.ascontiguousarray(parts.faces),
+            opposite_sides(parts.faces).astype(np.int64),
+            np.ascontiguousarray(parts.parent),
+            np.ascontiguousarray(parts.corners),
+            np.ascontiguousarray(vertices),
+            _distances_of_vertices(distances, parts, len(vertices)),
+            fixed,
+        ),
+        reached,
+        nicmm_kernels.LevelLimits(
+            level, clearance, COARSEST * clearance, FINEST * clearance, ERROR * clearance
+        ),
+        checkpoint,
+    )
+    parts = FaceParts(refined.faces, refined.parents, refined.corners)
+    values = refined.distances - level
+    parts, vertices = _kept(parts, refined.vertices, values, SNAP * clearance)
     return others.joined(parts), vertices
 
 
-def _evaluated(distances: SegmentDistances, parts: FaceParts, values: FloatArray) -> FloatArray:
-    """Distances of the vertices of parts; those that are not NaN stay."""
-    unknown = np.isnan(values[parts.faces])
-    vertex, first = np.unique(parts.faces[unknown], return_index=True)
-    row, corner = (index[first] for index in np.nonzero(unknown))
-    points = SurfacePoints(parts.parent[row], parts.corners[row, corner])
-    values = values.copy()
-    values[vertex] = distances.at(points)
-    return values
-
-
-def _errors(distances: SegmentDistances, parts: FaceParts, at_corners: FloatArray) -> FloatArray:
-    """Greatest error of linear interpolation at the centroid and in the middle of sides, (f,)."""
-    shares = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [1 / 3, 1 / 3, 1 / 3]])
-    weights = np.einsum("pc,fcd->fpd", shares, parts.corners).reshape(-1, 3)
-    points = SurfacePoints(parts.parent.repeat(len(shares)), weights)
-    exact = distances.at(points).reshape(-1, len(shares))
-    return np.abs(at_corners @ shares.T - exact).max(axis=1)
+def _distances_of_vertices(distances: SegmentDistances, parts: FaceParts, count: int) -> FloatArray:
+    """Distances of the vertices of parts, (count,); infinite for other vertices."""
+    vertex, first = np.unique(parts.faces, return_index=True)
+    row, corner = np.divmod(first, 3)
+    found = np.full(count, np.inf)
+    found[vertex] = distances.at(SurfacePoints(parts.parent[row], parts.corners[row, corner]))
+    return found
 
 
 def _side_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Length of the side opposite each corner, (f, 3)."""
     sides = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     return edge_lengths(vertices, sides).reshape(-1, 3)
-
-
-def _bisected(
-    parts: FaceParts, vertices: FloatArray, lengths: FloatArray, which: BoolArray, fixed: BoolArray
-) -> tuple[FaceParts, FloatArray]:
-    """Bisect the longest sides of some parts, and what else keeps the mesh conforming and sound.
-
-    A part one of whose sides is bisected is also bisected at its longest side, as in Rivara
-    ("Algorithms for refining triangular grids", 1984). Sides between two fixed vertices stay.
-    """
-    size = len(vertices)
-    sides = parts.faces[:, [[1, 2], [2, 0], [0, 1]]]
-    keys = edge_keys(sides[..., 0], sides[..., 1], size)
-    free = ~fixed[sides].all(axis=2)
-    # Of sides of equal length, the one with the greatest key counts as the longest in every part.
-    order = np.lexsort([keys, np.where(free, lengths, -1.0)], axis=1)
-    rows = np.arange(len(keys))
-    longest = keys[rows, order[:, -1]]
-    possible = free.any(axis=1)
-    marked = np.unique(longest[which & possible])
-    while True:
-        touched = np.isin(keys, marked).any(axis=1) & possible
-        more = np.union1d(marked, longest[touched])
-        if len(more) == len(marked):
-            break
-        marked = more
-    ends = np.stack(np.divmod(marked, size), axis=1)
-    middle = size + np.arange(len(marked))
-    return _divided(parts, vertices, ends, middle, np.full(len(marked), 0.5))
 
 
 def _divided(

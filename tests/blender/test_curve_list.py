@@ -222,7 +222,9 @@ def test_inverting_the_filter_of_the_list_shows_other_curves_only(empty_scene, s
     view = module(empty_scene, "interface.curve_list").NICMM_UL_curves
 
     def shown(**filters):
-        state = SimpleNamespace(bitflag_filter_item=1, filter_name="coll", **filters)
+        state = SimpleNamespace(
+            bitflag_filter_item=1, filter_name="coll", use_filter_sort_alpha=False, **filters
+        )
         flags, _ = view.filter_items(state, bpy.context, bpy.data, "objects")
         return [
             found

@@ -193,7 +193,12 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
         if not is_new_curve_option:
             recorded[name] = designing[name].default
     found = asdict(record.CurveSettings())
-    of_blender = {"use_modifiers": True, "mirror_axis": "NONE", "mirror_as": "JOINED"}
+    of_blender = {
+        "avoid_others": False,
+        "use_modifiers": True,
+        "mirror_axis": "NONE",
+        "mirror_as": "JOINED",
+    }
     assert list(found) == [*recorded, *of_blender]  # the digest depends on the order
     assert recorded["normal_bending"] == pytest.approx(scenes.NORMAL_BENDING)
     # Records from before there was this setting keep the curve as it is.

@@ -17,6 +17,7 @@ OPERATORS = (
     "convert_curve",
     "edit_curve",
     "update_curves",
+    "move_curve",
     "next_course",
     "choose_course",
     "new_map",

@@ -24,6 +24,15 @@ def turns(curve):
     return np.arccos(cosine.clip(-1.0, 1.0))
 
 
+def test_indices_may_be_an_array():
+    mesh = shapes.disc(12)
+    by_list = nicmm.design_curve(mesh, SQUARE, corners=[1, 2])
+    by_array = nicmm.design_curve(mesh, SQUARE, corners=np.array([1, 2]))
+    np.testing.assert_array_equal(by_array.curves[0].points, by_list.curves[0].points)
+    with pytest.raises(nicmm.ArgumentError, match="corners needs the method"):
+        nicmm.design_curve(mesh, SQUARE, corners=np.array([1, 2]), method="variational")
+
+
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_a_square_through_four_corners(factor):
     mesh = scaled(shapes.disc(30), factor)

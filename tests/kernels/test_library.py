@@ -1,8 +1,10 @@
 """The door of the compiled kernels: what does not fit raises an error, and crashes nothing."""
 
+import contextlib
 import pickle
 import subprocess
 import sys
+from unittest import mock
 
 import nicmm_kernels
 import numpy as np
@@ -13,12 +15,14 @@ from nicmm_kernels import KernelError
 
 import build
 from nicmm_core import shapes
+from nicmm_core.geometry.mesh import opposite_sides
 from tests.core.checks import curve_through, points_near
 
 BALL = shapes.sphere(2)
 CONTACT_RULES = nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12, 2.0)
 PLACEMENT = nicmm_kernels.PlacementRules(1e-6, 1e-5, 1.0, 0.1, 6)
 LIMITS = nicmm_kernels.TraceLimits(1e-6, 4096)
+FEW_WINDOWS = 4_000
 BAD_NUMBERS = st.sampled_from([np.nan, np.inf, -np.inf])
 BAD_INDICES = st.integers(-(2**62), 2**62).filter(lambda i: not 0 <= i < len(BALL.faces))
 
@@ -308,6 +312,58 @@ def arguments_paths(q=12):
     }
 
 
+def arguments_segments_in_faces(s=6):
+    """Arguments of `distances_from_segments` for s separate segments and s points, by name."""
+    third, half = np.full((s, 3), 1.0 / 3.0), np.tile([0.5, 0.3, 0.2], (s, 1))
+    return {
+        "mesh": BALL.for_kernels,
+        "faces": 3 * np.arange(s),
+        "starts": third,
+        "ends": half,
+        "previous": np.full(s, -1),
+        "following": np.full(s, -1),
+        "limit": 0.8,
+        "scale": 1e-14,
+        "meanwhile": nothing,
+        "at_faces": 3 * np.arange(s) + 1,
+        "at_barycentric": third.copy(),
+    }
+
+
+def distances_from_segments(at_faces, at_barycentric, **given):
+    """The sides that shortest paths enter, and the distances of points."""
+    with mock.patch.object(nicmm_kernels.segment_distances, "MOST_WINDOWS", FEW_WINDOWS):
+        paths = nicmm_kernels.SegmentPaths(**given)
+    return paths.sides, paths.at(at_faces, at_barycentric)
+
+
+def arguments_refinement(f=12):
+    """Arguments of `refined` for the first f faces of the ball as parts, by name."""
+    opposite = opposite_sides(BALL.faces[:f])
+    return {
+        "paths": nicmm_kernels.SegmentPaths(
+            **{k: v for k, v in arguments_segments_in_faces().items() if not k.startswith("at_")}
+        ),
+        "faces": BALL.faces[:f].copy(),
+        "opposite": opposite.astype(np.int64),
+        "parents": np.arange(f),
+        "corners": np.broadcast_to(np.eye(3), (f, 3, 3)).copy(),
+        "vertices": BALL.vertices.copy(),
+        "distances": np.linspace(0.0, 0.6, len(BALL.vertices)),
+        "fixed": np.zeros(len(BALL.vertices), dtype=bool),
+        "reached": np.ones(len(BALL.faces), dtype=bool),
+        "limits": nicmm_kernels.LevelLimits(0.3, 0.3, 0.2, 0.05, 0.01),
+        "meanwhile": nothing,
+    }
+
+
+def refined(paths, reached, limits, meanwhile, **parts):
+    """The triangles after bisection."""
+    return nicmm_kernels.refine_at_level(
+        paths, nicmm_kernels.PartArrays(**parts), reached, limits, meanwhile
+    )
+
+
 def arguments_turning(k=2, n=8):
     """Arguments of `turning_paths` with k control points among n cells, all joined, by name."""
     generator = np.random.default_rng(7)
@@ -405,6 +461,8 @@ CALLS = {
     "distances_along_edges": (nicmm_kernels.distances_along_edges, arguments_distances),
     "nearest_cells": (nicmm_kernels.nearest_cells, arguments_cells),
     "points_on_edge_paths": (nicmm_kernels.points_on_edge_paths, arguments_paths),
+    "distances_from_segments": (distances_from_segments, arguments_segments_in_faces),
+    "refine_at_level": (refined, arguments_refinement),
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
     "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
@@ -424,6 +482,7 @@ CALLS = {
 FINITE = {
     "trace_from": [("barycentric", None), ("directions", None), ("lengths", None)],
     "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
+    "distances_from_segments": [("starts", None), ("ends", None)],
     "trace_steps": [("places", 1)],
     "relax_curves": [("barycentric", None)],
     "CurveRelaxation": [("barycentric", None)],
@@ -431,6 +490,8 @@ FINITE = {
 """Arrays whose values have to be finite; others may have any values."""
 
 INDICES = {
+    "refine_at_level": [("faces", None), ("parents", None)],
+    "distances_from_segments": [("faces", None), ("at_faces", None)],
     "trace_steps": [("places", 0), ("start", None), ("end", None)],
     "place_nodes": [("faces", None)],
     "place_on_polyline": [("faces", None), ("controls", None)],
@@ -453,6 +514,8 @@ INDICES = {
 """Arrays of indices."""
 
 OF_ANY_LENGTH = [
+    ("refine_at_level", "faces"),
+    ("refine_at_level", "vertices"),
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
     ("polyline_crossings", "all_faces"),
@@ -468,6 +531,7 @@ OF_ANY_LENGTH = [
 ON_MESHES = [
     "EdgeGraphArrays",
     "TraceArrays",
+    "distances_from_segments",
     "place_nodes",
     "relax_curves",
     "trace_between",
@@ -477,6 +541,7 @@ ON_MESHES = [
 """Kernels that read a mesh."""
 
 RESUMED = [
+    "distances_from_segments",
     "distinct_curves",
     "distances_along_edges",
     "meeting_segments",
@@ -607,7 +672,9 @@ def test_meshes_with_arbitrary_neighbours_crash_nothing(name, seed):
     mesh = nicmm_kernels.MeshArrays(
         BALL.vertices, BALL.faces, BALL.face_normals, opposite, oriented
     )
-    function(**with_mesh(arguments(), mesh))
+    # Paths over such a mesh may not end before there is no room for them.
+    with contextlib.suppress(nicmm_kernels.TooManyWindowsError):
+        function(**with_mesh(arguments(), mesh))
 
 
 @pytest.mark.parametrize(
@@ -722,6 +789,61 @@ def test_curves_without_a_fixed_start_or_without_nodes_are_refused(name):
     key = "faces" if "faces" in given else "fixed"
     with pytest.raises(KernelError, match="one row per curve"):
         function(**{**given, key: given[key][:, :0]})
+
+
+@given(BAD_INDICES.filter(lambda i: i != -1), st.sampled_from(["previous", "following"]))
+def test_neighbours_that_do_not_exist_are_refused(index, name):
+    given = arguments_segments_in_faces()
+    given[name][3] = index
+    with pytest.raises(KernelError, match="index is out of range"):
+        distances_from_segments(**given)
+
+
+def test_bisected_triangles_conform_and_cover_the_same_area():
+    given = arguments_refinement(len(BALL.faces))
+    found = refined(**given)
+    assert len(found.faces) > 2 * len(BALL.faces)
+    mesh = type(BALL)(found.vertices, found.faces)
+    np.testing.assert_array_equal(found.opposite, mesh.opposite_sides)
+    assert mesh.is_oriented and not len(mesh.unpaired_edges[0])
+    assert mesh.face_areas.sum() == pytest.approx(BALL.face_areas.sum(), rel=1e-12)
+    in_parents = np.einsum("fcd,fdk->fck", found.corners, BALL.vertices[BALL.faces[found.parents]])
+    np.testing.assert_allclose(in_parents, found.vertices[found.faces], atol=1e-14)
+    new = np.arange(len(found.vertices)) >= len(BALL.vertices)
+    row, corner = np.nonzero(new[found.faces])
+    exact = given["paths"].at(found.parents[row], found.corners[row, corner])
+    near = exact < given["limits"].level
+    assert near.sum() > 100
+    there = found.distances[found.faces[row, corner]]
+    np.testing.assert_allclose(there[near], exact[near], atol=1e-12)
+
+
+def test_bisection_in_several_calls_gives_the_same(monkeypatch):
+    whole = refined(**arguments_refinement(200))
+    monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 3)
+    pauses = []
+    parts = refined(**{**arguments_refinement(200), "meanwhile": lambda: pauses.append(None)})
+    assert len(pauses) > 20
+    for one, other in zip(whole, parts, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_side_between_fixed_vertices_is_not_bisected():
+    given = arguments_refinement(200)
+    given["fixed"][:] = True
+    found = refined(**given)
+    assert len(found.faces) == 200
+
+
+def test_windows_that_do_not_fit_get_more_room_up_to_a_limit(monkeypatch):
+    whole = distances_from_segments(**arguments_segments_in_faces())
+    monkeypatch.setattr(nicmm_kernels.segment_distances, "WINDOWS_OF_A_SEGMENT", 1)
+    few = distances_from_segments(**arguments_segments_in_faces())
+    for one, other in zip(whole, few, strict=True):
+        assert np.array_equal(one, other)
+    monkeypatch.setitem(globals(), "FEW_WINDOWS", 20)
+    with pytest.raises(nicmm_kernels.TooManyWindowsError, match="more than"):
+        distances_from_segments(**arguments_segments_in_faces())
 
 
 @pytest.mark.parametrize("name", ["relax_curves", "even_places"])

@@ -30,6 +30,10 @@ DRAGGED, JUMPING = 3, 1
 SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))
 """Sideways and backwards on the crown of Suzanne's head; with three corners, a shield."""
 
+ACROSS, BEHIND = ((-0.45, -0.05), (0.0, 0.0), (0.45, -0.05)), ((-0.42, 0.45), (0.0, 0.5))
+"""Sideways and backwards on the crown: a curve across it, and the beginning of one behind it."""
+
+
 HALF = ((0.3, 0.62), (0.45, -0.14), (-0.22, -0.62))
 """Sideways and upwards on the front of Suzanne's head, the last one on the other side."""
 
@@ -905,6 +909,75 @@ def begin_choice(blender: Blender) -> None:
     blender.wait("helper.courses() is not None", "the courses")
 
 
+def several(blender: Blender) -> None:
+    """A curve that avoids another one, ends on it, and follows it."""
+    step("A curve across the crown")
+    blender.do("helper.suzanne()")
+    blender.do("helper.look(0.05, -0.15, 1.0, 3.0)")
+    choose_tool(blender)
+    blender.do("bpy.context.scene.nicmm_curves.closed = False")
+    click_places(blender, blender.do(f"value = helper.from_above({ACROSS})"))
+    blender.do("helper.curve().name = 'First'")
+    beside = (150, 650)
+    blender.move(beside)
+    blender.key("Return")
+    blender.wait("helper.curve() is None", "the end")
+    step("A second one behind it; a click on the first one makes a junction")
+    blender.do(
+        "panel = bpy.context.scene.nicmm_curves\n"
+        "panel.avoid_others, panel.clearance = True, 0.1\n"
+        'bpy.ops.ed.undo_push(message="Settings")'
+    )
+    click_places(blender, blender.do(f"value = helper.from_above({BEHIND})"))
+    blender.do("helper.curve().name = 'Second'")
+    (pixel,) = blender.do("value = helper.pixels(helper.middle_of_other('First', 1))")
+    blender.move((pixel[0] + 3, pixel[1] + 3))  # near the curve, not exactly on it
+    blender.shot("18-junction-before")
+    blender.click((pixel[0] + 3, pixel[1] + 3))
+    count_points(blender, 3)
+    check(blender.do("value = helper.junctions()") == [[2, "First"]], "a junction")
+    blender.move(beside)
+    blender.shot("19-junction")
+    drag_first(blender, beside)
+    blender.do("bpy.context.scene.nicmm_curves.avoid_others = False")
+    blender.do("bpy.context.scene.nicmm_curves.closed = True")
+
+
+def drag_first(blender: Blender, beside) -> None:
+    """Drag the first curve, which the second follows; then a point of the second onto the first."""
+    step("A drag of the first curve takes the second along, in one undo step")
+    blender.do("helper.switch('First', 'OBJECT')")
+    blender.do('bpy.ops.ed.undo_push(message="Activate")')
+    before = state(blender)
+    second = blender.do("value = helper.points_of('Second')")
+    drag(blender, pixel_of(blender, 1), 20, (0.0, -2.5), "20-first-dragged")
+    check(blender.do("value = helper.points_of('Second')") == second, "it waits for the release")
+    blender.mouse("mouseup", 1)
+    blender.wait("not helper.is_modal()", "the end of the drag")
+    blender.wait(f"helper.points_of('Second') != {second!r}", "the second curve follows")
+    after = state(blender)
+    blender.move(beside)
+    blender.shot("21-second-follows")
+    blender.key("ctrl+z")
+    blender.wait(f"helper.state() == {before!r}", "undo of both")
+    blender.key("ctrl+shift+z")
+    blender.wait(f"helper.state() == {after!r}", "redo of both")
+
+    step("A point of the second curve snaps to the first one while it is dragged")
+    blender.do("helper.switch('Second', 'OBJECT')")
+    blender.do('bpy.ops.ed.undo_push(message="Activate")')
+    (start,) = blender.do("value = helper.pixels(helper.places()[0])")
+    (end,) = blender.do("value = helper.pixels(helper.middle_of_other('First', 0))")
+    drag(blender, start, 20, part_of_way(start, end, 20), "22-snapped")
+    blender.mouse("mouseup", 1)
+    blender.wait("not helper.is_modal()", "the end of the drag")
+    blender.wait("len(helper.junctions()) == 2", "another junction")
+    blender.do("helper.show_sidebar()")
+    blender.move(beside)
+    blender.shot("23-list")
+    blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
 def large(blender: Blender) -> None:
     """Moves on 126k faces, and the first clicks on 2M faces."""
     step("126k faces: the moves of a drag")
@@ -959,7 +1032,7 @@ def large(blender: Blender) -> None:
 
     step("2M quads: the first click beside the mesh prepares it and ends")
     blender.do("helper.suzanne(6)\nhelper.forget()")
-    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    beside = (150, 650)
     time.sleep(10.0)
     blender.click(beside)
     blender.wait("helper.is_in_time_slices()", "the preparation of the mesh")
@@ -1073,6 +1146,7 @@ PARTS = {
     "keys": keys,
     "courses": courses,
     "via": via_points,
+    "several": several,
     "symmetry": symmetry,
     "large": large,
 }

@@ -363,6 +363,29 @@ class Helper:
         return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
     @classmethod
+    def middle_of_other(cls, name, leg):
+        """A point of a leg of a curve that is not active, near its middle."""
+        record = import_module(f"{MODULE}.scene.curve_record")
+        curve = bpy.data.objects[name]
+        surface = record.surface_of(curve, record.mesh_of(curve))
+        (found,) = record.read_curves(curve, surface)
+        index = import_module(f"{CORE}.geometry.curve").points_of_leg(found, leg)
+        return found.points[index[len(index) // 2]].tolist()
+
+    @classmethod
+    def junctions(cls, curve=None):
+        """The junctions of a curve, by default the active one: point, and name of the other."""
+        stored = (curve or cls.curve())["nicmm_curve"].get("junctions", ())
+        return [[each["point"], each["curve"].name] for each in stored]
+
+    @staticmethod
+    def points_of(name):
+        """A hash of the points of a curve object."""
+        splines = bpy.data.objects[name].data.splines
+        found = [list(point.co[:]) for spline in splines for point in spline.points]
+        return hashlib.sha1(repr(found).encode()).hexdigest()
+
+    @classmethod
     def state(cls):
         """A hash of everything that a designed curve consists of, for all curves."""
         found = []
@@ -370,6 +393,7 @@ class Helper:
             if "nicmm_curve" in each:
                 record = each["nicmm_curve"].to_dict()
                 record["mesh"] = record["mesh"].name
+                record["junctions"] = cls.junctions(each)
                 splines = [
                     [list(point.co[:]) for point in spline.points] for spline in each.data.splines
                 ]

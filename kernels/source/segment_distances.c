@@ -1,0 +1,663 @@
+/* Exact distances along the surface from segments that lie in faces, up to a limit.
+
+   Shortest paths from a segment are straight lines across unfolded faces. They are followed as
+   windows, intervals of edges, as in Mitchell, Mount and Papadimitriou ("The discrete geodesic
+   problem", 1987), in the order of their distances. Where a segment continues in another one, their
+   lines are divided at the bisector of the angle between them. So windows overlap only where paths
+   of different lengths meet; they are not trimmed there, and the least distance counts. Windows
+   that no shortest path enters are removed with the criterion of Xin and Wang ("Improving Chen and
+   Han's algorithm on the discrete geodesic problem", 2009). The cost follows the surface within the
+   limit, not the size of the mesh. */
+#include "segment_distances.h"
+
+#include <string.h>
+
+#include "arc_tangent.h"
+#include "queue.h"
+#include "vectors.h"
+
+/* Lines of neighbouring segments overlap by this slope, so that rounding leaves no gap. */
+static const double OVERLAP = 1.0 / 64.0;
+
+/* Cosine of the angle between segments below which their lines are not divided. */
+static const double SHARPEST = -0.5;
+
+/* Number of times that a side is halved to find the part of it that lines from a vertex reach. */
+enum { HALVINGS = 7 };
+
+/* Amount by which the angle around a vertex is greater than a full angle at least, if it is. */
+static const double SADDLE = 1e-9;
+
+static double cross_of(Vector one, Vector other)
+{
+    return one.x * other.y - one.y * other.x;
+}
+
+static Vector way(Vector from, Vector to)
+{
+    Vector found = {to.x - from.x, to.y - from.y};
+    return found;
+}
+
+static double norm(Vector vector)
+{
+    return sqrt(vector.x * vector.x + vector.y * vector.y);
+}
+
+/* The nearest point of a segment. */
+static Vector nearest_on(Vector start, Vector end, Vector point)
+{
+    Vector along = way(start, end), to = way(start, point);
+    double squared = greater(along.x * along.x + along.y * along.y, TINY);
+    double share = lesser(greater((to.x * along.x + to.y * along.y) / squared, 0.0), 1.0);
+    Vector found = {start.x + share * along.x, start.y + share * along.y};
+    return found;
+}
+
+/* A face in the plane, seen from one of its sides. */
+typedef struct {
+    double origin[3], x_axis[3], y_axis[3];
+    double length; /* of the side */
+    Vector apex;   /* the corner opposite to it */
+} Plane;
+
+static int plane_of(const Mesh *mesh, int64_t side, Plane *plane)
+{
+    const double *corners[3];
+    CHECK(side, 3 * mesh->face_count);
+    int64_t own = side % 3;
+    TRY(corners_of(mesh, side / 3, corners));
+    double to_apex[3];
+    for (int i = 0; i < 3; i++) {
+        plane->origin[i] = corners[FIRST_END[own]][i];
+        plane->x_axis[i] = corners[SECOND_END[own]][i] - plane->origin[i];
+        to_apex[i] = corners[own][i] - plane->origin[i];
+    }
+    plane->length = length_of(plane->x_axis);
+    for (int i = 0; i < 3; i++) plane->x_axis[i] /= greater(plane->length, TINY);
+    plane->apex.x = dot(to_apex, plane->x_axis);
+    for (int i = 0; i < 3; i++)
+        plane->y_axis[i] = to_apex[i] - plane->apex.x * plane->x_axis[i];
+    plane->apex.y = length_of(plane->y_axis);
+    for (int i = 0; i < 3; i++) plane->y_axis[i] /= greater(plane->apex.y, TINY);
+    return OK;
+}
+
+static Vector direction_in(const Plane *plane, const double direction[3])
+{
+    Vector found = {dot(direction, plane->x_axis), dot(direction, plane->y_axis)};
+    return found;
+}
+
+/* A point of the face, by barycentric coordinates. */
+static Vector point_in(const Plane *plane, int64_t own, const double *barycentric)
+{
+    Vector found = {barycentric[SECOND_END[own]] * plane->length + barycentric[own] * plane->apex.x,
+                    barycentric[own] * plane->apex.y};
+    return found;
+}
+
+/* Distance of a point of the face beyond a window; infinite where it is not seen. */
+static double distance_if_seen(const Window *window, Vector point, double scale)
+{
+    Vector nearest = nearest_on(window->start, window->end, point), away = way(nearest, point);
+    double crossing = point.x;
+    if (away.y > 0.0) crossing = nearest.x - away.x * nearest.y / away.y;
+    if (crossing < window->low - scale || crossing > window->high + scale) return INFINITY;
+    return window->before + norm(away);
+}
+
+/* The angle between two directions, in [0, pi]. */
+static double angle_between(Vector one, Vector other)
+{
+    return angle_of(fabs(cross_of(one, other)), one.x * other.x + one.y * other.y);
+}
+
+/* Lowers the distance of the vertex at a corner. */
+static int lower(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
+                 double arrival)
+{
+    int64_t vertex;
+    TRY(vertex_at(mesh, corner, &vertex));
+    if (!(distance < work->distances[vertex] - work->scale)) return OK;
+    work->distances[vertex] = distance;
+    work->corners[vertex] = corner;
+    work->arrivals[vertex] = arrival;
+    if (distance >= work->limit) return OK;
+    Queue queue = {mesh->vertex_count + work->room, work->queued, work->costs, work->items,
+                   work->places};
+    TRY(enqueue(&queue, vertex, distance));
+    work->queued = queue.count;
+    return OK;
+}
+
+/* Lowers the distance of the corner opposite to a side by a straight path from a segment. */
+static int lower_apex(const Mesh *mesh, Propagation *work, int64_t side, Vector apex, Vector start,
+                      Vector end, double before)
+{
+    Vector path = way(apex, nearest_on(start, end, apex)), first = {-apex.x, -apex.y};
+    return lower(mesh, work, side, before + norm(path), angle_between(first, path));
+}
+
+static double distance_at(const Window *window, double x)
+{
+    Vector point = {x, 0.0};
+    return window->before + norm(way(nearest_on(window->start, window->end, point), point));
+}
+
+/* Least distance of a window, or infinity if no shortest path up to the limit passes through it. */
+static int least_distance(const Mesh *mesh, const Propagation *work, int64_t side,
+                          const Window *window, double *least)
+{
+    int64_t first, second;
+    Plane plane;
+    TRY(ends_of(mesh, side, &first, &second));
+    TRY(plane_of(mesh, side, &plane));
+    double at_low = distance_at(window, window->low), at_high = distance_at(window, window->high);
+    Vector low = {window->low, 0.0}, high = {window->high, 0.0};
+    double from_start = norm(way(nearest_on(low, high, window->start), window->start));
+    double from_end = norm(way(nearest_on(low, high, window->end), window->end));
+    *least = lesser(lesser(at_low, at_high), window->before + lesser(from_start, from_end));
+    /* Where a path through a vertex is as short at the far end, it is everywhere. */
+    int is_useful = at_high < work->distances[first] + window->high - work->scale &&
+                    at_low < work->distances[second] + plane.length - window->low - work->scale;
+    if (!is_useful || !(*least < work->limit)) *least = INFINITY;
+    return OK;
+}
+
+/* Adds a window on a side of a face, given in the plane of this face, which has y > 0. Nothing is
+   added at a boundary, or if the window is of no use. */
+static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const Window *given,
+                      double length)
+{
+    CHECK(side, 3 * mesh->face_count);
+    int64_t beyond = mesh->opposite_sides[side], first, second, first_beyond;
+    if (beyond == side) return OK;
+    TRY(ends_of(mesh, side, &first, &second));
+    TRY(ends_of(mesh, beyond, &first_beyond, &second));
+    int is_turned = first != first_beyond;
+    double sign = is_turned ? -1.0 : 1.0, shift = is_turned ? length : 0.0;
+    Window window = {
+        {shift + sign * given->start.x, lesser(-given->start.y, 0.0)},
+        {shift + sign * given->end.x, lesser(-given->end.y, 0.0)},
+        given->before,
+        greater(is_turned ? length - given->high : given->low, 0.0),
+        lesser(is_turned ? length - given->low : given->high, length),
+        {0.0, 0.0},
+        {0.0, 0.0},
+    };
+    Vector at_low = is_turned ? given->at_high : given->at_low;
+    Vector at_high = is_turned ? given->at_low : given->at_high;
+    window.at_low.x = sign * at_low.x;
+    window.at_low.y = -at_low.y;
+    window.at_high.x = sign * at_high.x;
+    window.at_high.y = -at_high.y;
+    if (!(window.high - window.low > work->scale)) return OK;
+    double least;
+    TRY(least_distance(mesh, work, beyond, &window, &least));
+    if (least == INFINITY) return OK;
+    if (work->count >= work->room) return ARRAY_TOO_SMALL;
+    work->sides[work->count] = beyond;
+    work->windows[work->count] = window;
+    Queue queue = {mesh->vertex_count + work->room, work->queued, work->costs, work->items,
+                   work->places};
+    TRY(enqueue(&queue, mesh->vertex_count + work->count++, least));
+    work->queued = queue.count;
+    return OK;
+}
+
+/* Lowers `high` or raises `low` so that a linear function is not negative between them. */
+static void clip(double at_zero, double at_one, double *low, double *high)
+{
+    double zero = at_zero / (at_zero - at_one);
+    if (at_zero < 0.0 && at_one < 0.0)
+        *high = -1.0;
+    else if (at_zero < 0.0)
+        *low = greater(*low, at_one > 0.0 ? zero : 1.0);
+    else if (at_one < 0.0)
+        *high = lesser(*high, zero);
+}
+
+/* Direction of the line to a point of an edge from the nearest point of a segment; that of a given
+   line if the segment touches the edge there. In the plane of the face that is left, it leads to
+   y <= 0. */
+static Vector line_through(const Window *window, double x, Vector line, double along, double scale)
+{
+    Vector point = {x, 0.0}, found = way(nearest_on(window->start, window->end, point), point);
+    if (norm(found) <= scale) found = line;
+    if (found.y >= 0.0) {
+        found.x = along;
+        found.y = 0.0;
+    }
+    return found;
+}
+
+/* Adds the window of the lines on one side of a segment through a side of its own face.
+
+   sign : 1 for the lines to the left of the segment, -1 for those to the right
+   lines : directions of the outermost lines, at the start and at the end */
+static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, const Plane *plane,
+                            Vector start, Vector end, Vector along, double sign,
+                            const Vector lines[2])
+{
+    Vector corners[2] = {{0.0, 0.0}, {plane->length, 0.0}};
+    double values[3][2], low = 0.0, high = 1.0;
+    /* A side along the segment itself has its lines on one side only. */
+    Vector inward = {0.0, 1.0};
+    if (lesser(start.y, end.y) <= work->scale && greater(start.y, end.y) <= work->scale &&
+        norm(way(start, end)) > work->scale && sign * cross_of(along, inward) > 0.0)
+        return OK;
+    for (int i = 0; i < 2; i++) {
+        values[0][i] = sign * cross_of(along, way(start, corners[i]));
+        if (values[0][i] >= -work->scale) values[0][i] = greater(values[0][i], 0.0);
+        values[1][i] = sign * cross_of(way(start, corners[i]), lines[0]);
+        values[2][i] = sign * cross_of(lines[1], way(end, corners[i]));
+    }
+    for (int k = 0; k < 3; k++) clip(values[k][0], values[k][1], &low, &high);
+    if (!(low < high)) return OK;
+    Window window = {start, end, 0.0, low * plane->length, high * plane->length, {0, 0}, {0, 0}};
+    Vector at_low = {window.low, 0.0}, at_high = {window.high, 0.0};
+    int low_at_end = norm(way(at_low, end)) < norm(way(at_low, start));
+    int high_at_end = norm(way(at_high, end)) < norm(way(at_high, start));
+    window.at_low = line_through(&window, window.low, lines[low_at_end], -1.0, work->scale);
+    window.at_high = line_through(&window, window.high, lines[high_at_end], 1.0, work->scale);
+    return add_window(mesh, work, side, &window, plane->length);
+}
+
+/* The direction of a segment, in space; zero if it has no length. */
+static int direction_of(const Mesh *mesh, const Propagation *work, int64_t segment,
+                        double direction[3])
+{
+    const double *corners[3];
+    double start[3], end[3];
+    CHECK(segment, work->s);
+    TRY(corners_of(mesh, work->faces[segment], corners));
+    interpolate(corners, work->starts + 3 * segment, start);
+    interpolate(corners, work->ends + 3 * segment, end);
+    for (int i = 0; i < 3; i++) direction[i] = end[i] - start[i];
+    double length = length_of(direction);
+    for (int i = 0; i < 3; i++) direction[i] = length > work->scale ? direction[i] / length : 0.0;
+    return OK;
+}
+
+/* The direction of a neighbouring segment, unfolded into the plane of a face; zero if it is in
+   neither this face nor one beside it. */
+static int unfolded_direction(const Mesh *mesh, const Propagation *work, int64_t face,
+                              int64_t neighbour, double found[3])
+{
+    double direction[3];
+    for (int i = 0; i < 3; i++) found[i] = 0.0;
+    if (neighbour < 0) return OK;
+    TRY(direction_of(mesh, work, neighbour, direction));
+    if (work->faces[neighbour] == face) {
+        memcpy(found, direction, sizeof direction);
+        return OK;
+    }
+    for (int64_t side = 3 * face; side < 3 * face + 3; side++) {
+        int64_t beyond = mesh->opposite_sides[side];
+        if (beyond == side || beyond / 3 != work->faces[neighbour]) continue;
+        Plane plane, other;
+        TRY(plane_of(mesh, side, &plane));
+        TRY(plane_of(mesh, beyond, &other));
+        double along = dot(direction, plane.x_axis), across = dot(direction, other.y_axis);
+        for (int i = 0; i < 3; i++)
+            found[i] = along * plane.x_axis[i] - across * plane.y_axis[i];
+        return OK;
+    }
+    return OK;
+}
+
+/* The direction of the outermost line on one side of a segment at one of its ends.
+
+   outward : 1 at the end, -1 at the start */
+static Vector outermost(Vector along, Vector neighbour, double sign, double outward)
+{
+    Vector line = {outward * along.x, outward * along.y};
+    double cosine = along.x * neighbour.x + along.y * neighbour.y;
+    double length = norm(neighbour);
+    if (length < 0.5 || cosine < SHARPEST) return line;
+    Vector mean = {along.x + neighbour.x, along.y + neighbour.y};
+    double size = norm(mean);
+    Vector bisector = {-sign * mean.y / size, sign * mean.x / size};
+    /* On the inner side of a bend, the lines themselves are perpendicular to the segment. */
+    if (outward * (bisector.x * along.x + bisector.y * along.y) < 0.0) {
+        bisector.x = -sign * along.y;
+        bisector.y = sign * along.x;
+    }
+    line.x = bisector.x + OVERLAP * outward * along.x;
+    line.y = bisector.y + OVERLAP * outward * along.y;
+    return line;
+}
+
+static int begin_segment(const Mesh *mesh, Propagation *work, int64_t segment)
+{
+    double direction[3], before[3], after[3];
+    int64_t face = work->faces[segment];
+    CHECK(face, mesh->face_count);
+    CHECK(work->previous[segment] + 1, work->s + 1);
+    CHECK(work->following[segment] + 1, work->s + 1);
+    TRY(direction_of(mesh, work, segment, direction));
+    TRY(unfolded_direction(mesh, work, face, work->previous[segment], before));
+    TRY(unfolded_direction(mesh, work, face, work->following[segment], after));
+    for (int64_t side = 3 * face; side < 3 * face + 3; side++) {
+        Plane plane;
+        TRY(plane_of(mesh, side, &plane));
+        int64_t own = side % 3;
+        Vector start = point_in(&plane, own, work->starts + 3 * segment);
+        Vector end = point_in(&plane, own, work->ends + 3 * segment);
+        Vector along = direction_in(&plane, direction);
+        if (norm(along) < 0.5) along.x = 1.0; /* a point, which has lines in all directions */
+        TRY(lower_apex(mesh, work, side, plane.apex, start, end, 0.0));
+        for (int is_right = 0; is_right < 2; is_right++) {
+            double sign = is_right ? -1.0 : 1.0;
+            Vector lines[2] = {outermost(along, direction_in(&plane, before), sign, -1.0),
+                               outermost(along, direction_in(&plane, after), sign, 1.0)};
+            TRY(add_from_segment(mesh, work, side, &plane, start, end, along, sign, lines));
+        }
+    }
+    return OK;
+}
+
+/* Adds the windows on the other two sides of the face that a window leads into. */
+static int cross_face(const Mesh *mesh, Propagation *work, int64_t side, Window window)
+{
+    Plane plane;
+    TRY(plane_of(mesh, side, &plane));
+    int64_t own = side % 3, face_start = side - own;
+    Vector apex = plane.apex, corners[3] = {apex, {0.0, 0.0}, {plane.length, 0.0}};
+    double seen = distance_if_seen(&window, apex, work->scale);
+    int skipped = 0;
+    if (seen < INFINITY) {
+        int64_t vertex;
+        TRY(lower_apex(mesh, work, side, apex, window.start, window.end, window.before));
+        TRY(vertex_at(mesh, side, &vertex));
+        /* Shortest paths do not cross: beside a shorter one to the apex, lines continue only on
+           their own side of it, as by Chen and Han ("Shortest paths on a polyhedron", 1990). */
+        Vector path = way(apex, nearest_on(window.start, window.end, apex));
+        Vector first = {-apex.x, -apex.y};
+        if (seen > work->distances[vertex] + work->scale && work->corners[vertex] == side)
+            skipped = angle_between(first, path) < work->arrivals[vertex] ? 1 : 2;
+    }
+    Vector at_low = {window.low, 0.0}, at_high = {window.high, 0.0};
+    /* Sides from the second end to the apex, and from the apex to the first end. */
+    for (int k = 1; k < 3; k++) {
+        if (k == skipped) continue;
+        Vector begin = corners[k == 1 ? 2 : 0], end = corners[k == 1 ? 0 : 1];
+        Vector edge = way(begin, end);
+        double length = norm(edge), values[2][2], low = 0.0, high = 1.0;
+        if (!(length > 0.0)) continue;
+        for (int i = 0; i < 2; i++) {
+            Vector corner = i ? end : begin;
+            values[0][i] = cross_of(way(at_low, corner), window.at_low);
+            values[1][i] = cross_of(window.at_high, way(at_high, corner));
+        }
+        for (int j = 0; j < 2; j++) clip(values[j][0], values[j][1], &low, &high);
+        if (!(low < high)) continue;
+        Vector x_axis = {edge.x / length, edge.y / length};
+        Vector y_axis = {-x_axis.y, x_axis.x}; /* the face is to the left of the side */
+        Vector from[2] = {way(begin, window.start), way(begin, window.end)};
+        Window next = {
+            {from[0].x * x_axis.x + from[0].y * x_axis.y,
+             from[0].x * y_axis.x + from[0].y * y_axis.y},
+            {from[1].x * x_axis.x + from[1].y * x_axis.y,
+             from[1].x * y_axis.x + from[1].y * y_axis.y},
+            window.before, low * length, high * length, {0.0, 0.0}, {0.0, 0.0},
+        };
+        /* Seen from inside the face, the side runs from the line at `high` to that at `low`. */
+        Vector lines[2] = {window.at_high, window.at_low};
+        for (int i = 0; i < 2; i++) {
+            Vector line = {lines[i].x * x_axis.x + lines[i].y * x_axis.y,
+                           lines[i].x * y_axis.x + lines[i].y * y_axis.y};
+            int is_clipped = i ? high < 1.0 : low > 0.0;
+            double at = i ? next.high : next.low, outward = i ? 1.0 : -1.0;
+            Vector through = line_through(&next, at, line, outward, work->scale);
+            if (is_clipped && line.y < 0.0) through = line;
+            if (i)
+                next.at_high = through;
+            else
+                next.at_low = through;
+        }
+        TRY(add_window(mesh, work, face_start + (own + k) % 3, &next, length));
+    }
+    return OK;
+}
+
+/* A corner at the same vertex in the face beyond one of the two sides there, or -1 at a boundary.
+
+   side : the side through which the vertex is left; becomes the next one */
+static int next_corner(const Mesh *mesh, int64_t vertex, int64_t *side, int64_t *corner)
+{
+    CHECK(*side, 3 * mesh->face_count);
+    int64_t beyond = mesh->opposite_sides[*side], start, found;
+    *corner = -1;
+    if (beyond == *side) return OK;
+    CHECK(beyond, 3 * mesh->face_count);
+    start = beyond - beyond % 3;
+    for (int64_t j = 0; j < 3; j++) {
+        TRY(vertex_at(mesh, start + j, &found));
+        if (found == vertex && start + j != beyond) *corner = start + j;
+    }
+    if (*corner >= 0) *side = 3 * start + 3 - beyond - *corner; /* the third one of this face */
+    return OK;
+}
+
+/* Lowers the distances of the other vertices of a face at a corner by paths along its sides.
+
+   angle : becomes the angle at the corner */
+static int lower_in_face(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
+                         double *angle)
+{
+    int64_t own = corner % 3, start = corner - own;
+    Plane plane;
+    TRY(plane_of(mesh, corner, &plane));
+    Vector to_first = {-plane.apex.x, -plane.apex.y};
+    Vector to_second = {plane.length - plane.apex.x, -plane.apex.y}, along = {1.0, 0.0};
+    *angle = angle_between(to_first, to_second);
+    /* Seen from the first end, the corner is the second end of the opposite side. */
+    TRY(lower(mesh, work, start + FIRST_END[own], distance + norm(to_first),
+              angle_between(along, way(to_first, (Vector){0.0, 0.0}))));
+    return lower(mesh, work, start + SECOND_END[own], distance + norm(to_second), 0.0);
+}
+
+/* Adds the window of the lines from a vertex across the face at a corner that make an angle from
+   `low` to `high` with the edge to the first end of the opposite side. */
+static int add_from_vertex(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
+                           double low, double high)
+{
+    Plane plane;
+    TRY(plane_of(mesh, corner, &plane));
+    Vector apex = plane.apex, to_first = {-apex.x, -apex.y};
+    double bounds[2] = {0.0, plane.length}, wanted[2] = {low, high};
+    for (int k = 0; k < 2; k++) { /* the widest interval of some that are halved in turn */
+        double inside = k ? 0.0 : plane.length, outside = bounds[k];
+        for (int i = 0; i < HALVINGS; i++) {
+            Vector to_middle = {0.5 * (inside + outside) - apex.x, -apex.y};
+            double angle = angle_between(to_first, to_middle);
+            if (k ? angle > wanted[k] : angle < wanted[k])
+                outside = 0.5 * (inside + outside);
+            else
+                inside = 0.5 * (inside + outside);
+        }
+        bounds[k] = outside;
+    }
+    Window window = {apex, apex, distance, bounds[0], bounds[1],
+                     {bounds[0] - apex.x, -apex.y}, {bounds[1] - apex.x, -apex.y}};
+    return add_window(mesh, work, corner, &window, plane.length);
+}
+
+/* The faces around a vertex, in order, with their angles. */
+typedef struct {
+    int64_t vertex;
+    int64_t first;   /* the corner at which it begins */
+    int64_t corner;  /* the present one; -1 behind the boundary */
+    int64_t side;    /* through which the present face is left */
+    int64_t steps;   /* number of faces so far */
+    int is_reversed; /* whether the face before is at the edge to the second end, not the first */
+} Fan;
+
+/* Begins at the corner at which the path to a vertex arrives. The present face is left at its
+   second end, or at its first one if `is_reversed`. */
+static Fan fan_around(const Propagation *work, int64_t vertex, int is_reversed)
+{
+    int64_t first = work->corners[vertex], own = first % 3;
+    int64_t side = first - own + (is_reversed ? SECOND_END[own] : FIRST_END[own]);
+    Fan fan = {vertex, first, first, side, 0, is_reversed};
+    return fan;
+}
+
+static int is_in_fan(const Mesh *mesh, const Fan *fan)
+{
+    return fan->corner >= 0 && (fan->corner != fan->first || fan->steps == 0) &&
+           fan->steps <= mesh->face_count;
+}
+
+static int next_in_fan(const Mesh *mesh, Fan *fan)
+{
+    TRY(next_corner(mesh, fan->vertex, &fan->side, &fan->corner));
+    fan->steps++;
+    if (fan->corner < 0) return OK;
+    int64_t own = fan->corner % 3;
+    fan->is_reversed = fan->side == fan->corner - own + SECOND_END[own];
+    return OK;
+}
+
+/* Adds the lines that make an angle from `low` to `high` with the first edge of a fan. */
+static int add_from_fan(const Mesh *mesh, Propagation *work, Fan fan, double low, double high)
+{
+    double distance = work->distances[fan.vertex], begin = 0.0, angle;
+    for (; is_in_fan(mesh, &fan); begin += angle) {
+        TRY(lower_in_face(mesh, work, fan.corner, distance, &angle));
+        double from = low - begin, to = high - begin;
+        if (from < angle && to > 0.0) {
+            double least = fan.is_reversed ? angle - to : from;
+            double most = fan.is_reversed ? angle - from : to;
+            TRY(add_from_vertex(mesh, work, fan.corner, distance, least, most));
+        }
+        TRY(next_in_fan(mesh, &fan));
+    }
+    return OK;
+}
+
+/* Follows paths along the edges at a vertex. Shortest paths also bend at a vertex with more than a
+   full angle and on the boundary, by at least half a full angle on both sides; and they begin at a
+   vertex on a segment, in all directions. */
+static int leave_vertex(const Mesh *mesh, Propagation *work, int64_t vertex)
+{
+    double distance = work->distances[vertex], sum = 0.0, of_first, angle;
+    double arrival = work->arrivals[vertex];
+    CHECK(work->corners[vertex], 3 * mesh->face_count);
+    TRY(lower_in_face(mesh, work, work->corners[vertex], distance, &of_first));
+    int is_boundary = 0;
+    for (int is_reversed = 0; is_reversed < 1 + is_boundary; is_reversed++) {
+        Fan fan = fan_around(work, vertex, is_reversed);
+        while (is_in_fan(mesh, &fan)) {
+            TRY(lower_in_face(mesh, work, fan.corner, distance, &angle));
+            sum += angle;
+            TRY(next_in_fan(mesh, &fan));
+        }
+        is_boundary = fan.corner < 0;
+    }
+    int is_source = distance <= work->scale;
+    if (!is_source && !is_boundary && sum <= 2.0 * PI + SADDLE) return OK;
+    double low = arrival + PI - OVERLAP, high = arrival + sum - PI + OVERLAP;
+    if (is_source) low = -INFINITY;
+    if (is_source || is_boundary) high = INFINITY;
+    TRY(add_from_fan(mesh, work, fan_around(work, vertex, 0), low, high));
+    if (!is_boundary) return OK;
+    low = is_source ? -INFINITY : of_first - arrival + PI - OVERLAP;
+    return add_from_fan(mesh, work, fan_around(work, vertex, 1), low, INFINITY);
+}
+
+/* Finds the distances of vertices and all windows, in calls of about `most_work` windows each.
+
+   done : 0 at first; 1 after the last call */
+EXPORTED int segment_distances(const Mesh *mesh, Propagation *work, int64_t most_work,
+                               int64_t *done)
+{
+    if (work->count == 0 && work->queued == 0) {
+        if (!are_finite(work->starts, 3 * work->s) || !are_finite(work->ends, 3 * work->s))
+            return NOT_FINITE;
+        for (int64_t i = 0; i < work->s; i++) TRY(begin_segment(mesh, work, i));
+    }
+    for (int64_t steps = 0; steps < most_work; steps++) {
+        if (work->queued == 0) {
+            *done = 1;
+            return OK;
+        }
+        Queue queue = {mesh->vertex_count + work->room, work->queued, work->costs, work->items,
+                       work->places};
+        int64_t item;
+        TRY(dequeue(&queue, &item));
+        work->queued = queue.count;
+        if (item < mesh->vertex_count) {
+            TRY(leave_vertex(mesh, work, item));
+            continue;
+        }
+        item -= mesh->vertex_count;
+        double least;
+        TRY(least_distance(mesh, work, work->sides[item], &work->windows[item], &least));
+        if (least == INFINITY)
+            work->sides[item] = -1;
+        else
+            TRY(cross_face(mesh, work, work->sides[item], work->windows[item]));
+    }
+    return OK;
+}
+
+/* Index of the first of some ascending numbers that is not below a wanted one. */
+static int64_t first_not_below(const int64_t *numbers, int64_t count, int64_t wanted)
+{
+    int64_t low = 0, high = count;
+    while (low < high) {
+        int64_t middle = low + (high - low) / 2;
+        if (numbers[middle] < wanted)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+int distance_of_point(const Mesh *mesh, const Propagation *found, int64_t face,
+                      const double weights[3], double *distance)
+{
+    double position[3], least = INFINITY;
+    const double *corners[3];
+    Plane plane;
+    TRY(corners_of(mesh, face, corners));
+    interpolate(corners, weights, position);
+    for (int j = 0; j < 3; j++) {
+        int64_t vertex;
+        TRY(vertex_at(mesh, 3 * face + j, &vertex));
+        double through = found->distances[vertex] + distance_between(position, corners[j]);
+        least = lesser(least, through);
+    }
+    TRY(plane_of(mesh, 3 * face, &plane));
+    Vector point = point_in(&plane, 0, weights);
+    int64_t k = first_not_below(found->faces, found->s, face);
+    for (; k < found->s && found->faces[k] == face; k++) {
+        Vector start = point_in(&plane, 0, found->starts + 3 * k);
+        Vector end = point_in(&plane, 0, found->ends + 3 * k);
+        least = lesser(least, norm(way(nearest_on(start, end, point), point)));
+    }
+    k = first_not_below(found->sides, found->count, 3 * face);
+    for (int64_t side = 3 * face; k < found->count && found->sides[k] < 3 * face + 3; k++) {
+        if (found->sides[k] != side) {
+            side = found->sides[k];
+            TRY(plane_of(mesh, side, &plane));
+            point = point_in(&plane, side % 3, weights);
+        }
+        least = lesser(least, distance_if_seen(&found->windows[k], point, found->scale));
+    }
+    *distance = least;
+    return OK;
+}
+
+/* Distances of m points, as `distance_of_point` finds them. */
+EXPORTED int distances_of_points(const Mesh *mesh, const Propagation *found, int64_t m,
+                                 const int64_t *faces, const double *barycentric, double *distances)
+{
+    for (int64_t i = 0; i < m; i++)
+        TRY(distance_of_point(mesh, found, faces[i], barycentric + 3 * i, distances + i));
+    return OK;
+}
