@@ -207,3 +207,29 @@ def test_a_pair_may_end_on_a_pair(sphere):
         end = one.points[one.control_index[:1]]
         assert not contacts(mesh_of(sphere), one, other, junctions=end)
         np.testing.assert_allclose(end[0], other.points[other.control_index[1]], atol=ROUNDING)
+
+
+def test_marks_of_the_tool(empty_scene, sphere):
+    """A diamond, as a corner a star, and a hollow square for its image."""
+    overlay = module(empty_scene, "tool.overlay")
+    edited_curve = module(empty_scene, "outputs.edited_curve")
+    draw(sphere, SIDE, "First", "PAIR")
+    curve = curves_of("First")[0]
+    vertex = tuple(curve.points[curve.control_index[1]])
+    places = [vertex, (0.4, 0.3, 0.9), (0.3, 0.0, 0.95)]
+    second = draw(sphere, places, "Second", "PAIR", closed=False, **AVOIDING)
+
+    def shapes():
+        opened = edited_curve.open_curve(bpy.context, second)
+        return [mark.shapes for mark in overlay._marks(opened, None, overlay.Colours(bpy.context))]
+
+    def expect(*names):
+        found = shapes()
+        assert len(found) == len(names)
+        for shape, name in zip(found, names, strict=True):
+            assert shape is getattr(overlay, name)
+
+    hollow = ["_HOLLOW_DISCS", "_HOLLOW_DISCS"]
+    expect("_DIAMONDS", "_DISCS", "_DISCS", "_HOLLOW_DISCS", *hollow)
+    call("toggle_corner", curve="Second", index=0)
+    expect("_STARS", "_DISCS", "_DISCS", "_HOLLOW_SQUARES", *hollow)
