@@ -15,7 +15,7 @@ from bpy.props import (
 
 from ..nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
-from .scene import curve_record
+from .scene import curve_record, mirror_plane
 
 AUTOMATIC = (
     "AUTO",
@@ -109,10 +109,48 @@ SURFACE = {
 }
 
 
+MIRROR = {
+    "mirror_axis": EnumProperty(
+        name="Mirror",
+        description="The plane in which a curve of the method Elastic is mirrored",
+        items=(
+            (mirror_plane.NONE, "None", "No mirror"),
+            ("X", "X", "The plane through the object's origin across its local X axis"),
+            ("Y", "Y", "The plane through the object's origin across its local Y axis"),
+            ("Z", "Z", "The plane through the object's origin across its local Z axis"),
+            (
+                mirror_plane.MODIFIER,
+                "Mirror Modifier",
+                "The plane of the first Mirror modifier of the mesh that the viewport shows",
+            ),
+        ),
+        default=mirror_plane.NONE,
+    ),
+    "mirror_as": EnumProperty(
+        name="Mirror As",
+        description="What becomes of the mirror image",
+        items=(
+            (
+                mirror_plane.JOINED,
+                "Joined",
+                "One curve through the points of one side and their mirror images, which is its "
+                "own mirror image",
+            ),
+            (
+                mirror_plane.PAIR,
+                "Pair",
+                "The curve and its mirror image, as two splines of one object",
+            ),
+        ),
+        default=mirror_plane.JOINED,
+    ),
+}
+
+
 class DesignProperties:
     """The options of a new curve, shared by the operator and the scene settings."""
 
-    __annotations__ = properties_of(OPTIONS) | OTHERS | SURFACE
+    __annotations__ = properties_of(OPTIONS) | OTHERS | SURFACE | MIRROR
 
 
 class EditingProperties:
@@ -126,6 +164,7 @@ class EditingProperties:
         )
         | OTHERS
         | SURFACE
+        | MIRROR
     )
 
 
@@ -335,7 +374,7 @@ def draw(
     mesh_object: bpy.types.Object | None,
 ) -> None:
     """Draw all settings in the redo panel; `mesh_object` may be None."""
-    draw_design(layout, properties)
+    draw_design(layout, properties, mesh_object)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
@@ -346,7 +385,9 @@ def draw(
 
 
 def draw_design(
-    layout: bpy.types.UILayout, properties: bpy.types.Operator | bpy.types.PropertyGroup
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    mesh_object: bpy.types.Object | None,
 ) -> None:
     """Draw the settings of the curve itself, without its maps."""
     layout.use_property_split = True
@@ -357,8 +398,58 @@ def draw_design(
     column.active = properties.method == "ELASTIC"
     column.prop(properties, "normal_bending")
     column.prop(properties, "alternatives")
-    column.prop(properties, "avoid_others")
+    draw_avoid_others(column, properties)
+    draw_mirror(column, properties, mesh_object)
     layout.prop(properties, "use_modifiers")
+
+
+def draw_avoid_others(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    label: str = "Avoid Other Curves",
+) -> None:
+    """Draw whether the curve avoids others, greyed out if it is joined to its mirror image."""
+    has_mirror = properties.mirror_axis != mirror_plane.NONE
+    row = layout.row()
+    row.active = not (has_mirror and properties.mirror_as == mirror_plane.JOINED)
+    row.prop(properties, "avoid_others", text=label)
+
+
+def draw_mirror(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    mesh_object: bpy.types.Object | None,
+) -> None:
+    """Draw the mirror: its axis as Blender's own tools have it, and its modifier if there is one.
+
+    What becomes of the image is greyed out without a mirror.
+    """
+    chosen = properties.mirror_axis
+    # Buttons of single items do not take part in the split of labels and values.
+    split = layout.split(factor=0.4)
+    label = split.row()
+    label.alignment = "RIGHT"
+    label.label(text="Mirror")
+    items = split.column(align=True)
+    items.use_property_split = False
+    row = items.row(align=True)
+    for axis in mirror_plane.AXES:
+        row.prop_enum(properties, "mirror_axis", axis)
+    items.prop_enum(properties, "mirror_axis", mirror_plane.NONE)
+    if chosen == mirror_plane.MODIFIER or mirror_plane.modifier_of(mesh_object) is not None:
+        items.prop_enum(properties, "mirror_axis", mirror_plane.MODIFIER, icon="MOD_MIRROR")
+    row = layout.row()
+    row.active = chosen != mirror_plane.NONE
+    row.prop(properties, "mirror_as", expand=True)
+
+
+def draw_mirror_in_header(layout: bpy.types.UILayout, properties: bpy.types.PropertyGroup) -> None:
+    """Draw the mirror in the header of the tool, where there is little room."""
+    row = layout.row(align=True)
+    row.label(icon="MOD_MIRROR")
+    row.prop(properties, "mirror_axis", text="")
+    if properties.mirror_axis != mirror_plane.NONE:
+        row.prop(properties, "mirror_as", text="")
 
 
 def draw_clearance(

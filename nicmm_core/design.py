@@ -34,7 +34,7 @@ from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
-from .geometry.curve import SurfaceCurve
+from .geometry.curve import SurfaceCurve, points_of
 from .geometry.mesh import Mesh
 from .geometry.mirror import Plane, checked_plane
 from .geometry.surface_points import (
@@ -51,7 +51,14 @@ from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
-from .repair.off_curves import Avoided, avoided_curves, meeting_only_at_junctions
+from .repair.mapped_mesh import MappedMesh
+from .repair.off_curves import (
+    Avoided,
+    avoided_curves,
+    is_too_close,
+    meeting_only_at_junctions,
+    meets,
+)
 from .repaired_surface import (
     Manifold,
     RepairedSurface,
@@ -234,6 +241,72 @@ class Designer:
             )
             result = manifold.design_on_original(found, request)
         return replace(result, seconds=time.perf_counter() - started)
+
+    def check_avoids(
+        self, design: Design, avoid: Sequence[SurfaceCurve | Design], clearance: float = 0.0
+    ) -> None:
+        """Check that the curve of a design avoids other curves, as one designed with `avoid` does.
+
+        A mirror image is not relaxed (`mirrored`), so it may come too close to curves that the
+        mirrored curve avoids.
+
+        Parameters
+        ----------
+        design : Design
+            A design with one curve on this mesh.
+        avoid : list of SurfaceCurve or Design
+            Other curves on this mesh; control points of the design on them are junctions.
+        clearance : float, default 0
+            Least distance from these curves along the surface; it does not count near junctions.
+
+        Raises
+        ------
+        UnreachableError
+            If the curve crosses one of them, or comes closer to it than the clearance.
+        CurveError
+            If a curve does not lie on the mesh.
+        ArgumentError
+            If another argument cannot be used.
+        """
+        given = {option.name: option.default for option in OPTIONS}
+        given |= {"avoid": with_curves_of_designs(avoid), "clearance": clearance}
+        options = checked_options(self.mesh, given)
+        curve, _ = curve_of_design(self.mesh, only_curve(design, "design"), "design")
+        with self._exclusive():
+            points = points_of(curve)[curve.control_index[curve.control_index >= 0]]
+            avoided = avoided_curves(self.mesh, options["avoid"] or (), points)
+            for number, each in enumerate(avoided):
+                if meets(self.mesh, curve, each):
+                    raise UnreachableError(
+                        f"design crosses avoid[{number}]; move control points so that it stays on "
+                        "one side, or leave the other curve out"
+                    )
+            if not options["clearance"]:
+                return
+            mapped, there = self._curve_on_manifold(curve)
+            for number, each in enumerate(avoided):
+                if is_too_close(mapped, there, each, options["clearance"]):
+                    raise UnreachableError(
+                        f"design comes closer to avoid[{number}] than the clearance "
+                        f"({clearance:g}); move control points away from it, or use a smaller one"
+                    )
+
+    def _curve_on_manifold(self, curve: SurfaceCurve) -> tuple[MappedMesh, SurfaceCurve]:
+        """The first manifold of the whole surface that has a curve of design, and the curve on it.
+
+        Raises
+        ------
+        CurveError
+            If no manifold has it.
+        """
+        for mapped in self._whole.manifolds():
+            there = mapped.curve_to(curve) if mapped.differs else curve
+            if there is not None:
+                return mapped, there
+        raise CurveError(
+            "design cannot be mapped to a manifold, on which the clearance is measured; leave "
+            "clearance out"
+        )
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:

@@ -9,7 +9,7 @@ from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..operators.message_labels import draw_message
 from ..outputs import edited_curve
-from ..scene import curve_record
+from ..scene import curve_record, mesh_data
 from . import curve_list, icons, map_rows, menus
 
 
@@ -38,7 +38,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
             if curve == context.active_object:
                 self._draw_conversion(layout, properties)
             return
-        settings.draw_design(layout, properties)
+        settings.draw_design(layout, properties, mesh_data.mesh_object(context))
         settings.draw_output(layout, properties)
         operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
         for name in settings.PROPERTY_NAMES:

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty
 
 from .. import settings
 from ..outputs import curve_object, tube_radius, writing
-from ..scene import avoided_curves, curve_record, mesh_data
+from ..scene import avoided_curves, curve_record, mesh_data, mirror_plane
 from ..scene.messages import InputError
 from . import polls
 from .error_reports import with_error_reports
@@ -71,9 +71,19 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
             self._take_appearance(original, mesh_object)
         corners = curve_record.corners_of(original)
         via = curve_record.current_via_points(original, mesh_object, surface)
+        mirror = mirror_plane.mirror_of(mesh_object, surface, curve_settings)
         others = avoided_curves.above(original, mesh_object, surface, curve_settings)
         summary = writing.apply(
-            context, mesh_object, surface, curves, self, curve_settings, corners, via, others
+            context,
+            mesh_object,
+            surface,
+            curves,
+            self,
+            curve_settings,
+            corners,
+            via,
+            mirror,
+            others,
         )
         if is_separate:
             converted = context.active_object

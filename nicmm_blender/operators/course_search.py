@@ -51,12 +51,13 @@ class Course:
 
     Attributes
     ----------
-    curve : SurfaceCurve of the core
+    curves : list of SurfaceCurve of the core
+        The curve, and the second curve of a pair.
     energy : float
         Energy relative to that of the fairest course.
     """
 
-    curve: SurfaceCurve
+    curves: list[SurfaceCurve]
     energy: float
 
 
@@ -112,7 +113,7 @@ class CourseSearch(LongSolves):
             fairest = edited_curve.design_of(answers[0])
             designs = [fairest, *fairest.alternatives]
             _found.clear()
-            _found[self._key] = [Course(each.curves[0], each.relative_energy) for each in designs]
+            _found[self._key] = [Course(each.curves, each.relative_energy) for each in designs]
         if self._opened.curve_object is None:
             raise InputError(edited_curve.DELETED)
         return self.use_courses(context, self._opened, _found[self._key])
@@ -124,7 +125,7 @@ def index_of_current(opened: Opened, courses: list[Course]) -> int | None:
 
     if opened.curve is None:
         return None
-    curves = [course.curve for course in courses]
+    curves = [course.curves[0] for course in courses]
     return current_course(surface_cache.core_mesh(opened.surface), opened.curve, curves)
 
 
@@ -149,6 +150,11 @@ def name_of(opened: Opened) -> str:
 def _without_via_points(opened: Opened, leg: int) -> Opened:
     """A curve without the via points of a leg for which another course is sought."""
     edited_curve.checked_leg(opened, leg)
+    if opened.mirror is not None and opened.mirror.joined:
+        raise InputError(
+            f'A leg of "{name_of(opened)}" has no other courses of its own, since its mirror image '
+            "changes with it. Choose among the courses of the whole curve, or add via points"
+        )
     if opened.curve is None:
         raise InputError(
             f'The surface has changed since "{name_of(opened)}" was designed. Run Update '

@@ -35,6 +35,8 @@ COURSE = (
     "obstacle_group",
     "alignment_group",
     "clearance",
+    "mirror_axis",
+    "mirror_as",
 )
 DRAWING = ("spline", "offset")
 
@@ -139,7 +141,7 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> list[str]:
         record = curve[curve_order.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         try:
-            writing.redraw(curve, opened.surface, curves, opened.points.corners)
+            writing.redraw(curve, opened.surface, curves, opened.points.corners, opened.mirror)
         except BaseException:
             if before is None:
                 del record["drawn"]
@@ -229,7 +231,8 @@ def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     mesh_object = curve_record.mesh_of(curve)
     for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
-    layout.prop(values, "avoid_others", text="Avoid Others")  # the header is narrow
+    settings.draw_avoid_others(layout, values, "Avoid Others")  # the header is narrow
+    settings.draw_mirror_in_header(layout, values)
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")
@@ -242,8 +245,11 @@ def draw(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     values = curve.nicmm_settings
     layout.use_property_split = True
     layout.use_property_decorate = False
-    for name in ("closed", "smoothness", "normal_bending", "avoid_others", "use_modifiers"):
+    for name in ("closed", "smoothness", "normal_bending"):
         layout.prop(values, name)
+    settings.draw_avoid_others(layout, values)
+    settings.draw_mirror(layout, values, curve_record.mesh_of(curve))
+    layout.prop(values, "use_modifiers")
     for name in ("spline", "radius", "offset"):
         layout.prop(values, name)
     if problem := problem_of(curve):

@@ -11,11 +11,11 @@ from bpy.props import StringProperty
 from .. import settings
 from ..outputs import writing
 from ..scene import curve_order, curve_record, design_request, mesh_data, selection
-from ..scene.curve_record import CurveSettings
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
 from ..scene.surface import Surface, active_modifiers_text, read
 from . import polls
+from .asymmetry_report import asymmetry_text
 from .long_solves import LongSolves
 
 if TYPE_CHECKING:
@@ -133,7 +133,8 @@ class NICMM_OT_design_curve(
             curve_order.reverse(curve_record.designed_on(mesh_object)[-count:])
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
-        summary = f"{_summary(mesh_object, design, order, request.settings)}: {result}"
+        summary = f"{_summary(mesh_object, design, order, request)}: {result}"
+        summary += asymmetry_text(context.scene, request.surface, design)
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
         if design.repairs:
@@ -157,6 +158,7 @@ class NICMM_OT_design_curve(
             request.settings,
             design_request.corners_of(request, design),
             request.via,
+            request.mirror,
             request.others,
         )
 
@@ -167,12 +169,13 @@ def _alternatives(operator: NICMM_OT_design_curve) -> int:
 
 
 def _summary(
-    mesh_object: bpy.types.Object, design: "Design", order: str, curve_settings: CurveSettings
+    mesh_object: bpy.types.Object, design: "Design", order: str, request: DesignRequest
 ) -> str:
-    curve = design.curves[0]
-    points = counted(len(curve.control_index), "control point")
+    points = counted(len(request.points), "control point")
+    if request.mirror is not None:
+        order += ", with mirror images" if request.mirror.joined else ", with its mirror image"
     summary = f"Curve through {points} {order}, {design.seconds:.1f} s"
-    shown = "" if curve_settings.use_modifiers else active_modifiers_text(mesh_object)
+    shown = "" if request.settings.use_modifiers else active_modifiers_text(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 

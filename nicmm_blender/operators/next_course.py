@@ -46,7 +46,7 @@ class NICMM_OT_next_course(CourseSearch, bpy.types.Operator):
         following = 1 if current is None else 1 + (current + 1) % len(courses)
         self.course = min(self.course, len(courses)) or following
         name = course_search.name_of(opened)
-        edited_curve.rewrite(opened, opened.points, [courses[self.course - 1].curve])
+        edited_curve.rewrite(opened, opened.points, courses[self.course - 1].curves)
         self.changed_curves = (opened.curve_uid,)
         self.report({"INFO"}, f'"{name}": course {self.course} of {len(courses)}{opened.remark}')
         return {"FINISHED"}

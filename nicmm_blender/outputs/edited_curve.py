@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...nicmm_core.options import FEWEST_OPEN
 from ..scene import (
     avoided_curves,
     curve_record,
     design_request,
     junctions,
     mesh_data,
+    mirror_images,
+    mirror_plane,
     point_lists,
     surface_cache,
 )
@@ -29,6 +30,8 @@ from ..scene.design_request import DesignRequest
 from ..scene.junctions import OtherCurve
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
+from ..scene.mirror_images import Images
+from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface, active_modifiers_text
 from ..scene.via_points import ViaPoints, leg_before, no_via_points, number_of_legs
 from . import curve_object, writing
@@ -36,6 +39,7 @@ from .writing import ObjectSettings
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core.geometry.plane_section import PlaneSection
     from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
@@ -67,6 +71,10 @@ class Opened:
         The recorded curve; None if the curve is new or has to be designed again.
     remark : str
         Text that is appended to reports; may be empty.
+    mirror : Mirror or None
+        The mirror of the curve.
+    image : SurfaceCurve of the core, or None
+        The mirror image of the curve if the object has both.
     others : tuple of OtherCurve
         The curves that it avoids.
     """
@@ -79,7 +87,36 @@ class Opened:
     via: ViaPoints
     curve: SurfaceCurve | None
     remark: str
+    mirror: Mirror | None = None
+    image: SurfaceCurve | None = None
     others: tuple[OtherCurve, ...] = ()
+
+    @property
+    def curves(self) -> list[SurfaceCurve]:
+        """The curves of the object: none, the curve, or the curve and its mirror image."""
+        return [each for each in (self.curve, self.image) if each is not None]
+
+    @cached_property
+    def images(self) -> Images:
+        """The mirror images of the control points; none without a mirror."""
+        return mirror_images.images_of(self.surface, self.mirror, self.points)
+
+    def image_positions(self) -> np.ndarray:
+        """Positions of the images in the object's local space, (m, 3)."""
+        return self.surface.points(self.images.places.faces, self.images.places.barycentric)
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """Where the plane of a curve joined to its image cuts the surface; None for others."""
+        if self.mirror is None or not self.mirror.joined:
+            return None
+        return surface_cache.section_with(self.surface, self.mirror.plane)
+
+    @property
+    def path(self) -> tuple[int, bool]:
+        """Number of points and closedness of a curve with the same legs; see `path_of`."""
+        closed = self.settings.closed
+        return mirror_images.path_of(self.surface, self.mirror, self.points.places, closed)
 
     @property
     def mesh_object(self) -> bpy.types.Object:
@@ -110,9 +147,9 @@ class Opened:
         """Positions of the via points in the object's local space, (m, 3)."""
         return self.surface.points(self.via.points.faces, self.via.points.barycentric)
 
-    def polyline(self) -> np.ndarray:
-        """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
-        return polyline_of(self.surface, self.curve)
+    def lines(self) -> list[np.ndarray]:
+        """Points of each curve in the object's local space, (n, 3); see `polyline_of`."""
+        return [polyline_of(self.surface, curve) for curve in self.curves]
 
 
 def positions_of(surface: Surface, points: ControlPoints) -> np.ndarray:
@@ -120,10 +157,8 @@ def positions_of(surface: Surface, points: ControlPoints) -> np.ndarray:
     return surface.points(points.places.faces, points.places.barycentric)
 
 
-def polyline_of(surface: Surface, curve: SurfaceCurve | None) -> np.ndarray:
+def polyline_of(surface: Surface, curve: SurfaceCurve) -> np.ndarray:
     """Points of a curve in the object's local space, (n, 3); a closed curve repeats the first."""
-    if curve is None:
-        return np.zeros((0, 3))
     line = surface.points(curve.faces, curve.barycentric)
     return np.concatenate([line, line[:1]]) if curve.closed else line
 
@@ -179,15 +214,7 @@ def open_curve(
         Whether the curve keeps its course if only settings of `SAME_COURSE` differ. With any other
         change of settings it is designed from scratch, because another course may be the best one.
     """
-    if edited is None:
-        mesh_object = mesh_data.mesh_object(context)
-        if mesh_object is None:
-            raise InputError("Make a mesh or a designed curve active")
-        before = replace(curve_record.settings_from(context.scene.nicmm_curves), method="ELASTIC")
-    else:
-        mesh_object = curve_record.mesh_in_view_layer(context, edited)
-        writing.check_replaceable(edited)
-        before = curve_record.settings_of(edited)
+    mesh_object, before = _mesh_and_settings(context, edited)
     settings = before if settings is None else settings
     surface = surface_cache.get(mesh_object, settings.use_modifiers)
     if not len(surface.faces):
@@ -196,33 +223,83 @@ def open_curve(
     beyond = active_modifiers_text(mesh_object)
     if beyond and not settings.use_modifiers:
         remarks.append(f"on the mesh without its {beyond}")
+    if edited is not None:
+        settings = _without_missing_maps(mesh_object, settings, remarks)
+    via, elastic = no_via_points(), replace(settings, method="ELASTIC")
+    opened = Opened(
+        curve_uid=0 if edited is None else edited.session_uid,
+        mesh_uid=mesh_object.session_uid,
+        surface=surface,
+        settings=settings,
+        points=ControlPoints(via.points, np.zeros(0, dtype=bool)),
+        via=via,
+        curve=None,
+        remark="",
+        mirror=mirror_plane.mirror_of(mesh_object, surface, settings),
+        others=avoided_curves.above(edited, mesh_object, surface, elastic),
+    )
+    if edited is not None:
+        kept = _settings_that_keep_the_curve(before, settings, keeps_course)
+        opened = _with_recorded_points(opened, edited, kept == before, remarks)
+    return replace(opened, remark="".join(f"; {each}" for each in remarks))
+
+
+def _mesh_and_settings(
+    context: bpy.types.Context, edited: bpy.types.Object | None
+) -> tuple[bpy.types.Object, CurveSettings]:
+    """The mesh object of a curve and its settings; those of the sidebar for a new curve."""
+    if edited is not None:
+        mesh_object = curve_record.mesh_in_view_layer(context, edited)
+        writing.check_replaceable(edited)
+        return mesh_object, curve_record.settings_of(edited)
+    mesh_object = mesh_data.mesh_object(context)
+    if mesh_object is None:
+        raise InputError("Make a mesh or a designed curve active")
+    panel = curve_record.settings_from(context.scene.nicmm_curves)
+    return mesh_object, replace(panel, method="ELASTIC")
+
+
+def _without_missing_maps(
+    mesh_object: bpy.types.Object, settings: CurveSettings, remarks: list[str]
+) -> CurveSettings:
+    """Settings without maps that no longer exist, each of which adds a remark."""
     for name in MAPS:
         group = getattr(settings, name)
-        if edited is not None and group and group not in mesh_object.vertex_groups:
+        if group and group not in mesh_object.vertex_groups:
             settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
-    via, curve = no_via_points(), None
-    points = ControlPoints(via.points, np.zeros(0, dtype=bool))
-    if edited is not None:
-        via = curve_record.current_via_points(edited, mesh_object, surface)
-        points, moved = curve_record.current_control_points(edited, mesh_object, surface)
-        if moved:
-            points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
-            remarks.append(f"the mesh has changed: {points_moved}")
-        else:
-            kept = replace(settings, method=before.method)
-            for name in SAME_COURSE if keeps_course else ():
-                kept = kept.with_value(name, getattr(before, name))
-            if kept == before:
-                curve = _curve_of(edited, surface)
-    remark = "".join(f"; {each}" for each in remarks)
-    uid = 0 if edited is None else edited.session_uid
-    others = avoided_curves.above(edited, mesh_object, surface, replace(settings, method="ELASTIC"))
-    if edited is not None and others:
-        points = _with_junctions(edited, surface, points, others)
-    return Opened(
-        uid, mesh_object.session_uid, surface, settings, points, via, curve, remark, others
-    )
+    return settings
+
+
+def _settings_that_keep_the_curve(
+    before: CurveSettings, settings: CurveSettings, keeps_course: bool
+) -> CurveSettings:
+    """Settings with the former values of those whose change keeps the curve."""
+    kept = replace(settings, method=before.method)
+    for name in SAME_COURSE if keeps_course else ():
+        kept = kept.with_value(name, getattr(before, name))
+    return kept
+
+
+def _with_recorded_points(
+    opened: Opened, edited: bpy.types.Object, keeps_curve: bool, remarks: list[str]
+) -> Opened:
+    """An opened curve with its control points and via points, and its curve if this is kept.
+
+    Control points that were moved to the nearest positions add a remark.
+    """
+    mesh_object, surface = opened.mesh_object, opened.surface
+    via = curve_record.current_via_points(edited, mesh_object, surface)
+    points, moved = curve_record.current_control_points(edited, mesh_object, surface)
+    curve, image = None, None
+    if moved:
+        points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
+        remarks.append(f"the mesh has changed: {points_moved}")
+    elif keeps_curve:
+        curve, image = _curves_of(edited, surface)
+    if opened.others:
+        points = _with_junctions(edited, surface, points, opened.others)
+    return replace(opened, points=points, via=via, curve=curve, image=image)
 
 
 def is_current(curve_object: bpy.types.Object, opened: Opened) -> bool:
@@ -244,9 +321,9 @@ def _with_junctions(
 
 def request(edited: Opened, points: ControlPoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
-    if len(points) < FEWEST_OPEN:
-        return []
     settings = replace(edited.settings, method="ELASTIC")
+    if not design_request.is_enough(edited.surface, edited.mirror, points, settings):
+        return []
     found = design_request.for_drawing(
         edited.mesh_object, edited.surface, points, edited.via, settings, edited.curve_object
     )
@@ -281,7 +358,9 @@ def write(
     if edited.curve_uid:
         return rewrite(edited, points, curves)
     mesh_object = edited.mesh_object
-    result = writing.as_object(mesh_object, edited.surface, curves, settings, points.corners)
+    result = writing.as_object(
+        mesh_object, edited.surface, curves, settings, points.corners, edited.mirror
+    )
     _record(result, mesh_object, edited, points, curves, writing.drawn_as(settings))
     curve_object.place(context, mesh_object, result)
     return result
@@ -292,7 +371,7 @@ def rewrite(edited: Opened, points: ControlPoints, curves: list[SurfaceCurve]) -
     result, mesh_object = edited.curve_object, edited.mesh_object
     if result is None:
         raise InputError(DELETED)
-    writing.redraw(result, edited.surface, curves, points.corners)
+    writing.redraw(result, edited.surface, curves, points.corners, edited.mirror)
     drawn = curve_record.drawn_as(result)
     _record(result, mesh_object, edited, points, curves, drawn)
     return result
@@ -308,7 +387,7 @@ def _record(
 ) -> None:
     points = snapped(edited, points)
     curve_settings = replace(edited.settings, method="ELASTIC")
-    via = edited.via.fitting(len(points), curve_settings.closed)
+    via = edited.via.fitting(*replace(edited, points=points).path)
     curve_record.write_record(
         result,
         mesh_object,
@@ -372,7 +451,7 @@ def with_toggled_corner(points: ControlPoints, number: int) -> ControlPoints:
 
 def via_after_insertion(edited: Opened, number: int, place: SurfacePoints) -> ViaPoints:
     """The via points after the control point `place` has been inserted at an index."""
-    count, closed = len(edited.points), edited.settings.closed
+    count, closed = edited.path
     leg = leg_before(number, count, closed)
     via = edited.via
     divided, is_behind = via.legs == leg, np.zeros(len(via), dtype=bool)
@@ -392,7 +471,7 @@ def snapped(edited: Opened, points: ControlPoints) -> ControlPoints:
 
 def checked_leg(edited: Opened, leg: int) -> int:
     """The index of a leg; an error if the curve has no such leg."""
-    count = number_of_legs(len(edited.points), edited.settings.closed)
+    count = number_of_legs(*edited.path)
     if not 0 <= leg < count:
         raise InputError(f"There is no leg {leg}; the curve has {count}, counted from 0")
     return leg
@@ -415,10 +494,17 @@ def _along_leg(edited: Opened, leg: int, points: SurfacePoints) -> np.ndarray:
     return along_leg(edited.curve, leg, points.positions(mesh))
 
 
-def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:
-    """The recorded curve of an object, or None if it has to be designed again."""
+def _curves_of(
+    edited: bpy.types.Object, surface: Surface
+) -> tuple[SurfaceCurve | None, SurfaceCurve | None]:
+    """The recorded curve of an object and the image in its pair; None for what does not exist.
+
+    The curve is also None if it has to be designed again.
+    """
     if not curve_record.lies_on(edited, surface):
-        return None
+        return None, None
     curves = curve_record.read_curves(edited, surface)
+    if design_request.is_pair(curve_record.settings_of(edited)):
+        return curves[0], curves[1]
     whole = len(curves) == 1 and (curves[0].control_index >= 0).all()
-    return curves[0] if whole else None
+    return curves[0] if whole else None, None

@@ -12,18 +12,19 @@ import numpy as np
 
 import bmesh
 
-from ..scene import curve_record
+from ..scene import curve_record, mirror_images
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest, corners_of
 from ..scene.junctions import OtherCurve
 from ..scene.messages import InputError, check_finite, counted, sentence
+from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface
 from ..scene.via_points import ViaPoints
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
 if TYPE_CHECKING:
-    from ...nicmm_core import CutMesh, Design, Mesh, Region, SurfaceCurve
+    from ...nicmm_core import CutMesh, Design, Mesh, Region, SurfaceCurve, SurfacePoints
     from ...nicmm_core.outputs.polygons import CutPolygons
 
 SEPARATE = ("CURVE", "STICKY")
@@ -87,17 +88,19 @@ def apply(
     curve_settings: CurveSettings,
     corners: np.ndarray,
     via: ViaPoints | None = None,
+    mirror: Mirror | None = None,
     others: Sequence[OtherCurve] = (),
 ) -> str:
     """Create the chosen output and return a summary for the report.
 
     `settings` holds the output settings, `curve_settings` the settings of the curves, `corners`,
-    (k,), tells which of their control points are corners, `via` are their via points, and `others`
-    the curves that they avoid.
+    (k,), tells which of their control points are corners, without mirror images, `via` are their
+    via points, and `others` the curves that they avoid.
     """
     if settings.output in SEPARATE:
-        new_object = as_object(mesh_object, surface, curves, settings, corners)
+        new_object = as_object(mesh_object, surface, curves, settings, corners, mirror)
         drawn = drawn_as(settings)
+        controls = _controls(curves, corners, mirror)
         curve_record.write_record(
             new_object,
             mesh_object,
@@ -106,11 +109,17 @@ def apply(
             curve_settings,
             drawn,
             corners,
-            via=via,
-            others=others,
+            controls,
+            via,
+            others,
         )
         curve_object.place(context, mesh_object, new_object)
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
+    if mirror is not None and not mirror.joined:
+        raise InputError(
+            "The mesh cannot be cut along a pair of curves. Set Mirror As to Joined, or set Mirror "
+            "to None and cut along one curve after the other"
+        )
     if len(curves) != 1:
         raise InputError(
             f"There are {len(curves)} curves, and only one can be cut. Set Output to Curve to see "
@@ -133,11 +142,13 @@ def as_object(
     curves: list[SurfaceCurve],
     settings: ObjectSettings,
     corners: np.ndarray,
+    mirror: Mirror | None = None,
 ) -> bpy.types.Object:
     """Create an object that shows curves, without linking it to a collection.
 
-    `corners`, (k,), tells which of their control points are corners.
+    `corners`, (k,), tells which of their control points are corners, without mirror images.
     """
+    corners = mirror_images.corners_along(curves, corners, mirror)
     for name in ("radius", "thickness", "offset"):
         check_finite(name, getattr(settings, name))
     radius = automatic_radius(surface, settings.radius, settings.thickness)
@@ -153,12 +164,14 @@ def redraw(
     surface: Surface,
     curves: list[SurfaceCurve],
     corners: np.ndarray,
+    mirror: Mirror | None = None,
 ) -> None:
     """Replace the curves in a curve object; its radius, materials and modifiers are kept.
 
-    `corners`, (k,), tells which of their control points are corners. A linked duplicate gets data
-    of its own, since its record describes only its own curve.
+    `corners`, (k,), tells which of their control points are corners, without mirror images. A
+    linked duplicate gets data of its own, since its record describes only its own curve.
     """
+    corners = mirror_images.corners_along(curves, corners, mirror)
     if drawn.data.users - drawn.data.use_fake_user > 1:
         drawn.data = drawn.data.copy()
     kind = curve_record.drawn_as(drawn)
@@ -186,15 +199,15 @@ def _parent_again(drawn: bpy.types.Object, surface: Surface) -> None:
         tube_radius.set_radius(drawn, tube_radius.radius_of(drawn) * before / after)
 
 
-def show_unfinished(drawn: bpy.types.Object, surface: Surface, curve: SurfaceCurve) -> None:
-    """Show a curve that is being changed in its object, with all points of the exact curve."""
+def show_unfinished(drawn: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
+    """Show curves that are being changed in their object, with all points of the exact curves."""
     kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
     drawing = Drawing(EXACT, 0.0, kind["offset"])
     no_corners = np.zeros(0, dtype=bool)  # exact curves are sharp anyway
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn, surface, [curve], drawing, no_corners)
+        sticky_curves.write(drawn, surface, curves, drawing, no_corners)
     else:
-        curve_object.write_splines(drawn, splines(surface, [curve], drawing, no_corners))
+        curve_object.write_splines(drawn, splines(surface, curves, drawing, no_corners))
 
 
 def drawn_as(settings: ObjectSettings) -> Drawn:
@@ -236,8 +249,8 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         raise InputError(str(answer)) from answer
     if not answer.curves:
         raise InputError(sentence(str(answer.status)))
-    corners = corners_of(request, answer)
-    redraw(designed, request.surface, answer.curves, corners)
+    corners, mirror = corners_of(request, answer), request.mirror
+    redraw(designed, request.surface, answer.curves, corners, mirror)
     curve_record.write_record(
         designed,
         request.mesh_object(),
@@ -246,9 +259,17 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         request.settings,
         curve_record.drawn_as(designed),
         corners,
-        via=request.via,
-        others=request.others,
+        _controls(answer.curves, corners, mirror),
+        request.via,
+        request.others,
     )
+
+
+def _controls(
+    curves: list[SurfaceCurve], corners: np.ndarray, mirror: Mirror | None
+) -> SurfacePoints | None:
+    """The control points of the given side of a curve with a mirror; None without a mirror."""
+    return None if mirror is None else mirror_images.controls_of(curves, len(corners))
 
 
 def _cutting(

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind
-from . import curve_order, junctions, mesh_data, record_check, surface_cache
+from . import curve_order, junctions, mesh_data, mirror_plane, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .control_points import ControlPoints
 from .curve_order import RECORD_KEY
@@ -43,7 +43,7 @@ KINDS = ("CURVE", "CURVES")
 VERSION = 5
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
 of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, those up
-to 3 have no via points, and those up to 4 no rank and no junctions."""
+to 3 have no via points, and those up to 4 no mirror, no rank and no junctions."""
 
 FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
 """Methods by their names in records of versions before 3."""
@@ -72,7 +72,13 @@ def property_name(option: Option) -> str:
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
-UNCHANGED = (", use_modifiers=False", ", normal_bending=0.0", ", avoid_others=False")
+UNCHANGED = (
+    ", use_modifiers=False",
+    ", normal_bending=0.0",
+    ", avoid_others=False",
+    ", mirror_axis='NONE'",
+    ", mirror_as='JOINED'",
+)
 """Settings whose values were the only ones before there were these settings."""
 
 NEW_CURVE_OPTIONS = ("order", "alternatives")
@@ -88,7 +94,7 @@ RECORDED = tuple(
 
 @dataclass(frozen=True)
 class CurveSettings:
-    """The settings of a curve, besides its control points: `RECORDED`, and the use of modifiers."""
+    """The settings of a curve, besides its control points: `RECORDED` and those of Blender."""
 
     closed: bool = True
     method: str = "ELASTIC"
@@ -99,6 +105,8 @@ class CurveSettings:
     alignment_group: str = ""
     avoid_others: bool = False
     use_modifiers: bool = True
+    mirror_axis: str = mirror_plane.NONE
+    mirror_as: str = mirror_plane.JOINED
 
     @property
     def avoids(self) -> bool:
@@ -193,10 +201,6 @@ def write_record(
     """
     if controls is None:
         controls = _control_points_of(curves)
-    points = _points_to_store(CONTROL, surface, controls.faces, controls.barycentric)
-    if via is not None and len(via):
-        points["via_legs"] = via.legs.tolist()
-        points |= _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
     curve_object[RECORD_KEY] = {
         "version": VERSION,
         curve_order.RANK: _rank_of(curve_object, mesh_object),
@@ -205,13 +209,9 @@ def write_record(
         "faces": surface.faces_digest,
         "triangles": surface.triangles_digest,
         "vertices": len(surface.local_positions),
-        "counts": [len(curve.faces) for curve in curves],
-        "closed": [int(curve.closed) for curve in curves],
-        "corners": _flat([surface.faces[curve.faces] for curve in curves]),
-        "barycentric": _flat([curve.barycentric for curve in curves]),
-        "control_counts": [len(curve.control_index) for curve in curves],
-        "control_index": _flat([curve.control_index for curve in curves]),
-        **points,
+        **_curves_to_store(surface, curves),
+        **_points_to_store(CONTROL, surface, controls.faces, controls.barycentric),
+        **_via_points_to_store(surface, via),
         "corner_points": corners.astype(int).tolist(),
         **_junctions_to_store(surface, controls, others),
         "asked": asdict(settings),
@@ -220,6 +220,26 @@ def write_record(
     # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings, others)
     surface_cache.note_change()
+
+
+def _curves_to_store(surface: Surface, curves: list[SurfaceCurve]) -> dict[str, list[float]]:
+    """Curves as a record stores them."""
+    return {
+        "counts": [len(curve.faces) for curve in curves],
+        "closed": [int(curve.closed) for curve in curves],
+        "corners": _flat([surface.faces[curve.faces] for curve in curves]),
+        "barycentric": _flat([curve.barycentric for curve in curves]),
+        "control_counts": [len(curve.control_index) for curve in curves],
+        "control_index": _flat([curve.control_index for curve in curves]),
+    }
+
+
+def _via_points_to_store(surface: Surface, via: ViaPoints | None) -> dict[str, list[float]]:
+    """Via points as a record stores them; nothing if there are none."""
+    if via is None or not len(via):
+        return {}
+    points = _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
+    return {"via_legs": via.legs.tolist(), **points}
 
 
 def _rank_of(curve_object: bpy.types.Object, mesh_object: bpy.types.Object) -> int:
@@ -299,6 +319,8 @@ def digest(
     found.update(surface.faces.tobytes())
     if settings.clearance > 0.0 and surface.unit != 1.0:
         found.update(np.float64(surface.unit).tobytes())
+    if (mirror := mirror_plane.mirror_of(mesh_object, surface, settings)) is not None:
+        found.update(mirror.argument().tobytes())
     for name in groups_of(settings):
         if name in mesh_object.vertex_groups:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
@@ -439,24 +461,21 @@ def curves_on(context: bpy.types.Context, mesh_object: bpy.types.Object) -> list
     ]
 
 
-def positions_of(curve_object: bpy.types.Object, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's local space.
+def lines_of(curve_object: bpy.types.Object, surface: Surface) -> list[np.ndarray]:
+    """The points of each curve of an object, (n, 3), in the mesh's local space.
 
     Points whose triangle no longer exists are left out; a closed curve ends with its first point.
     """
     record = _checked_record(curve_object)
-    found = []
-    for kind in (CONTROL, ""):
-        names = (f"{kind}corners", f"{kind}barycentric")
-        faces, barycentric = (np.zeros(0, np.int64), np.zeros((0, 3)))
-        if names[0] in record:
-            faces, barycentric = _find_points(record, *names, surface)
-        there = faces >= 0
-        found.append(surface.points(faces[there], barycentric[there]))
-    points, line = found
-    if len(record["closed"]) == 1 and record["closed"][0] and len(line):
-        line = np.concatenate([line, line[:1]])
-    return points, line
+    faces, barycentric = _find_points(record, "corners", "barycentric", surface)
+    lines = []
+    ends = np.cumsum(record["counts"], dtype=np.int64)
+    for end, count, closed in zip(ends, record["counts"], record["closed"], strict=True):
+        here = np.arange(end - count, end)
+        here = here[faces[here] >= 0]
+        line = surface.points(faces[here], barycentric[here])
+        lines.append(np.concatenate([line, line[:1]]) if closed else line)
+    return lines
 
 
 def lies_on(curve_object: bpy.types.Object, surface: Surface) -> bool:

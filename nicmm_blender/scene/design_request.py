@@ -16,12 +16,13 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
-from . import avoided_curves, curve_record, junctions, surface_cache
+from . import avoided_curves, curve_record, junctions, mirror_images, mirror_plane, surface_cache
 from .control_points import ControlPoints
 from .curve_record import CurveSettings
 from .junctions import Junction, OtherCurve
 from .lookup import by_uid
 from .messages import InputError, user_message
+from .mirror_plane import Mirror
 from .surface import Surface, group_weights, read
 from .via_points import ViaPoints
 
@@ -37,10 +38,10 @@ if TYPE_CHECKING:
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points`, `options` and `start` are arguments for the core; `options` has the via points, too.
-    With a `leg`, only other courses of this leg of the start are sought. `moved` counts the control
-    points that were moved to the nearest point of the surface because their triangles no longer
-    exist.
+    `points`, `options` and `start` are arguments for the core; `options` has the via points, too,
+    and the mirror of a curve that is joined to its mirror image. With a `leg`, only other courses
+    of this leg of the start are sought. `moved` counts the control points that were moved to the
+    nearest point of the surface because their triangles no longer exist.
 
     `others` are the curves to avoid; the options have their curves, too. `junctions` are control
     points that follow them. `curve_uid` is the session_uid of the curve object, 0 for a new one.
@@ -57,6 +58,7 @@ class DesignRequest:
     start: Design | SurfaceCurve | None = None
     leg: int | None = None
     moved: int = 0
+    mirror: Mirror | None = None
     curve_uid: int = 0
     others: tuple[OtherCurve, ...] = ()
     junctions: tuple[Junction, ...] = ()
@@ -112,11 +114,21 @@ def for_points(
     curve_object : bpy.types.Object, optional
         The curve object; by default the curve is new.
     """
+    if settings.method != "ELASTIC":  # other methods have no mirror
+        settings = replace(settings, mirror_axis=mirror_plane.NONE)
+    mirror = mirror_plane.mirror_of(mesh_object, surface, settings)
     options = curve_record.arguments_of(
         settings,
         lambda name: group_weights(mesh_object, name, surface.with_modifiers) if name else None,
     )
     options["clearance"] /= surface.unit
+    if mirror is not None and mirror.joined:
+        if settings.avoids:
+            raise InputError(
+                "A curve that is joined to its mirror image cannot avoid other curves. Turn Avoid "
+                "Other Curves off, set Mirror As to Pair, or set Mirror to None"
+            )
+        options["mirror"] = mirror.argument()
     request = DesignRequest(
         mesh_name=mesh_object.name,
         mesh_uid=mesh_object.session_uid,
@@ -125,6 +137,7 @@ def for_points(
         order=order,
         settings=settings,
         options=options,
+        mirror=mirror,
         curve_uid=0 if curve_object is None else curve_object.session_uid,
     )
     return with_others(request, avoided_curves.above(curve_object, mesh_object, surface, settings))
@@ -191,11 +204,24 @@ def for_drawing(
 ) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
     request = for_points(mesh_object, surface, points.places, "given", settings, curve_object)
-    closed = settings.closed and len(points) >= FEWEST_CLOSED
+    total, mirror = len(points), request.mirror
+    if mirror is not None and mirror.joined:
+        total = mirror_images.half_of(surface, mirror, points.places).total
+    closed = settings.closed and total >= FEWEST_CLOSED
     # Other methods have no corners.
     corners = corner_indices(points.corners) if settings.method == "ELASTIC" else None
     options = {**request.options, "closed": closed, "corners": corners}
-    return with_via_points(replace(request, options=options), via.fitting(len(points), closed))
+    path = mirror_images.path_of(surface, mirror, points.places, closed)
+    return with_via_points(replace(request, options=options), via.fitting(*path))
+
+
+def is_enough(
+    surface: Surface, mirror: Mirror | None, points: ControlPoints, settings: CurveSettings
+) -> bool:
+    """Whether a curve that is drawn point by point has enough points."""
+    if mirror is None or not mirror.joined:
+        return len(points) >= FEWEST_OPEN
+    return mirror_images.half_of(surface, mirror, points.places).is_enough(settings.closed)
 
 
 def with_via_points(request: DesignRequest, via: ViaPoints) -> DesignRequest:
@@ -211,11 +237,17 @@ def corner_indices(corners: np.ndarray) -> list[int] | None:
 
 
 def corners_of(request: DesignRequest, design: Design) -> np.ndarray:
-    """Whether each control point of a designed curve is a corner, in the order visited, (k,)."""
+    """Whether each control point of a designed curve is a corner, in the order visited, (k,).
+
+    Without the mirror images of control points.
+    """
     if design.resumable is None:  # of a method without corners
         passed = [curve.control_index >= 0 for curve in design.curves]
         return np.zeros(np.concatenate(passed).sum(), dtype=bool)
-    return np.isin(design.resumable.visited, request.options["corners"] or [])
+    visited = design.resumable.visited
+    if request.mirror is not None:
+        visited = visited[: len(request.points)]
+    return np.isin(visited, request.options["corners"] or [])
 
 
 def for_curve(
@@ -226,7 +258,8 @@ def for_curve(
 ) -> DesignRequest:
     """A request to design a curve again on the current surface, along the same course."""
     points, moved = curve_record.current_control_points(curve_object, mesh_object, surface)
-    if len(points) < FEWEST_OPEN:
+    mirror = mirror_plane.mirror_of(mesh_object, surface, settings)
+    if not is_enough(surface, mirror, points, settings):
         raise InputError(curve_record.no_curve_message(curve_object))
     via = curve_record.current_via_points(curve_object, mesh_object, surface)
     request = for_drawing(mesh_object, surface, points, via, settings, curve_object)
@@ -236,9 +269,15 @@ def for_curve(
     start = None
     if settings.method == "ELASTIC" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
-        if len(curves) == 1:
+        if len(curves) == 1 or is_pair(curve_record.settings_of(curve_object)):
             start = surface_cache.design_of(surface, curves[0]) or curves[0]
     return replace(request, start=start, moved=moved)
+
+
+def is_pair(settings: CurveSettings) -> bool:
+    """Whether the second curve of an object is the mirror image of the first."""
+    has_mirror = settings.mirror_axis != mirror_plane.NONE and settings.method == "ELASTIC"
+    return has_mirror and settings.mirror_as == mirror_plane.PAIR
 
 
 def answer(request: DesignRequest, progress: Progress) -> Design:
@@ -253,7 +292,7 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
         try:
             design = None
             if request.leg is not None:
-                return _leg_courses(designer, request, progress)
+                return with_image(designer, request, _leg_courses(designer, request, progress))
             if request.start is not None:
                 # If the curve cannot keep its course, the core searches for a new one below.
                 with contextlib.suppress(nicmm.CurveError):
@@ -261,7 +300,7 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
             if design is None:
                 design = designer.design(request.points, **arguments)
             surface_cache.store_design(request.surface, design)
-            return design
+            return with_image(designer, request, design)
         except nicmm.NicmmError as error:
             raise InputError(message_of(error, request)) from error
 
@@ -272,6 +311,32 @@ def message_of(error: Exception, request: DesignRequest) -> str:
     at = vertices if vertices is not None and vertices.ndim == 1 else None
     avoided = [other.name for other in request.others for _ in other.curves]
     return user_message(error, request.settings.obstacle_group, at, avoided)
+
+
+def with_image(designer: Designer, request: DesignRequest, design: Design) -> Design:
+    """A design with the mirror image as a second curve, if the request asks for a pair.
+
+    The image has to avoid the same curves. Alternatives whose mirror images do not, or do not
+    exist, are left out.
+    """
+    from ... import nicmm_core as nicmm
+
+    mirror = request.mirror
+    if mirror is None or mirror.joined or len(design.curves) != 1:
+        return design
+    image = designer.mirrored(design, mirror.argument())
+    if request.options["avoid"]:
+        designer.check_avoids(image, request.options["avoid"], request.options["clearance"])
+    alternatives = []
+    for each in design.alternatives:
+        with contextlib.suppress(nicmm.CurveError, nicmm.UnreachableError):
+            alternatives.append(with_image(designer, request, each))
+    return replace(design, curves=[*design.curves, *image.curves], alternatives=alternatives)
+
+
+def without_image(design: Design) -> Design:
+    """The design of the first curve of a pair, from which another design can start."""
+    return replace(design, curves=design.curves[:1])
 
 
 def _leg_courses(designer: Designer, request: DesignRequest, progress: Progress) -> Design:

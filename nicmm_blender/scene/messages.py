@@ -9,6 +9,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
+IMAGES = "mirror images of control_points"
+"""What the core calls the mirror images of control points in its errors."""
+
+MIRROR_WORDS = {
+    "pass the points of one side, since their mirror images are added": "keep the points of one "
+    "side, since their mirror images are added",
+    "leave mirror out": "set Mirror to None",
+    "the mirror image of design": "the mirror image of the curve",
+    "design crosses": "the mirror image of the curve crosses",
+    "design comes closer": "the mirror image of the curve comes closer",
+    "move control points so that it stays on one side, or leave the other curve out": "move the "
+    "points, turn Avoid Other Curves off, or set Mirror to None and draw both curves",
+    "pass another plane": "choose another mirror",
+    "about plane; design a curve through the mirror images of its control points instead": "about "
+    "the mirror; set Mirror to None and draw both curves",
+}
+"""What the core says about mirrors, and the words for it in Blender."""
+
 
 class InputError(Exception):
     """Blender's data cannot be used; the message says what to change."""
@@ -34,12 +52,17 @@ def user_message(
     """
     text = str(error)
     for point in getattr(error, "points", ()):
+        if point.argument == IMAGES:
+            text = text.replace(str(point), f"the mirror image of point {point.index + 1}")
+    for point in getattr(error, "points", ()):
         if point.argument == "control_points":
             at = "" if vertices is None else f" (vertex {vertices[point.index]})"
             text = text.replace(str(point), f"point {point.index + 1}{at}")
         elif leg := re.fullmatch(r"via_points\[(\d+)\]", point.argument):
             before = int(leg[1]) + 1
             text = text.replace(str(point), f"via point {point.index + 1} after point {before}")
+    for core_words, words in MIRROR_WORDS.items():
+        text = text.replace(core_words, words)
     text = text.replace("control_points has 1 point,", "there is 1 point,")
     text = text.replace("control_points has", "there are").replace("control_points", "the points")
     text = re.sub(r"in the order \[([\d, ]+)\]", _counted_from_one, text)

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from . import mirror_plane
+
 Record = Mapping[str, Any]
 """The custom property that holds a record."""
 
@@ -67,6 +69,7 @@ def _check_points(record: Record) -> None:
     count = _check_stored(record, "control_")
     if "corner_points" in record and (_whole(record, "corner_points", count, least=0) > 1).any():
         raise _DamagedError("corner_points has values other than 0 and 1")
+    _check_mirror(record, count, control_counts)
     if "via_legs" in record:
         legs = _whole(record, "via_legs", _check_stored(record, "via_"), least=0)
         if (np.diff(legs) < 0).any() or (legs >= count).any():
@@ -74,6 +77,30 @@ def _check_points(record: Record) -> None:
     _check_junctions(record, count)
     if not len(counts) and (len(closed) or len(control_counts)):
         raise _DamagedError("it has settings of a curve but no curve")
+
+
+def _check_mirror(record: Record, count: int, control_counts: np.ndarray) -> None:
+    """Check that a curve with a mirror passes through its control points and their images.
+
+    Parameters
+    ----------
+    record : mapping
+    count : int
+        Number of stored control points.
+    control_counts : int array
+        Number of control points of each curve, images included.
+    """
+    asked = record.get("asked")
+    if asked is None or asked.get("mirror_axis", mirror_plane.NONE) == mirror_plane.NONE:
+        return
+    if asked.get("mirror_as") == mirror_plane.PAIR:
+        fits = control_counts.tolist() in ([], [count, count])
+    else:  # up to two points are on the plane, and have no images
+        fits = not len(control_counts) or (
+            len(control_counts) == 1 and 2 * count - 2 <= control_counts[0] <= 2 * count
+        )
+    if not fits:
+        raise _DamagedError("its curve does not fit its control points and its mirror")
 
 
 def _check_junctions(record: Record, count: int) -> None:
@@ -128,6 +155,8 @@ def _check_settings(record: Record, settings_type: type) -> None:
             if not (
                 isinstance(value, str) if isinstance(field.default, str) else _is_finite(value)
             ):
+                raise _DamagedError(f"its setting {field.name} is {value!r}")
+            if value not in mirror_plane.CHOICES.get(field.name, (value,)):
                 raise _DamagedError(f"its setting {field.name} is {value!r}")
     if drawn is not None and not (
         is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))

@@ -30,6 +30,8 @@ from .viewports import redraw
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, Designer, Mesh, SurfaceCurve
+    from ...nicmm_core.geometry.mirror import Plane
+    from ...nicmm_core.geometry.plane_section import PlaneSection
     from ...nicmm_core.progress import Progress
 
 MOST_SURFACES = 4
@@ -60,11 +62,14 @@ class _Computed:
         The latest designs, the oldest first.
     is_busy : bool
         Whether the designer is working in time slices.
+    section : (bytes, PlaneSection) or None
+        The last section with the plane of a mirror, and that plane.
     """
 
     designer: Designer
     designs: list[Design] = field(default_factory=list)
     is_busy: bool = False
+    section: tuple[bytes, PlaneSection] | None = None
 
 
 class _Cache:
@@ -233,6 +238,16 @@ def design_of(surface: Surface, curve: SurfaceCurve) -> Design | None:
         if len(design.curves) == 1 and _is_same(design.curves[0], curve):
             return design
     return None
+
+
+def section_with(surface: Surface, plane: Plane) -> PlaneSection:
+    """Where a plane of the core cuts a surface; computed again only for another plane."""
+    from ...nicmm_core.geometry.plane_section import plane_section
+
+    computed, key = _computed(surface), plane.point.tobytes() + plane.normal.tobytes()
+    if computed.section is None or computed.section[0] != key:
+        computed.section = key, plane_section(computed.designer.mesh, plane)
+    return computed.section[1]
 
 
 def is_prepared(surface: Surface) -> bool:

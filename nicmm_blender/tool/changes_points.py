@@ -11,11 +11,12 @@ import bpy
 import numpy as np
 
 from ..operators import polls
+from ..operators.asymmetry_report import asymmetry_text
 from ..operators.long_solves import LongSolves
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..outputs.writing import SEPARATE
-from ..scene import curve_record
+from ..scene import curve_record, mirror_images, point_lists
 from ..scene.control_points import ControlPoints
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
@@ -43,7 +44,15 @@ class ChangesPoints(LongSolves):
     index: int
     position: Sequence[float]
     from_mouse: bool
+    image: bool
     """Properties of the operators; each has those that it needs."""
+
+    IMAGE = bpy.props.BoolProperty(
+        name="Mirror Image",
+        description="The position is that of the mirror image of the point",
+        default=False,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
 
     if TYPE_CHECKING:  # Blender evaluates annotations of operators without loading the core
         dragged: SurfacePoints | None
@@ -83,15 +92,19 @@ class ChangesPoints(LongSolves):
     def finish(
         self, context: bpy.types.Context, _requests: list[DesignRequest], answers: list[Answer]
     ) -> set[str]:
-        curves = edited_curve.curves_of(answers)
+        curves, remark = edited_curve.curves_of(answers), self._edited.remark
+        for answer in answers:
+            design = edited_curve.design_of(answer)
+            remark += asymmetry_text(context.scene, self._edited.surface, design)
         panel = context.scene.nicmm_curves
         edited = self._edited
         result = edited_curve.write(context, edited, edited.points, curves, _Output(panel))
         modes.make_active(context, result)
         self.changed_curves = (result.session_uid,)
-        if edited.remark:
+        if remark:
             count = len(edited.points)
-            self.report({"WARNING"}, f'"{result.name}" through {count} points{edited.remark}')
+            kind = {"WARNING"} if edited.remark else {"INFO"}
+            self.report(kind, f'"{result.name}" through {count} points{remark}')
         return {"FINISHED"}
 
     def checked_index(self, opened: Opened) -> int:
@@ -112,8 +125,26 @@ class ChangesPoints(LongSolves):
             )
         return self.index
 
-    def place(self, opened: Opened) -> SurfacePoints:
-        """The position of the new or moved point on the surface, as a point of the core."""
+    def place(self, opened: Opened, moved: int | None = None) -> SurfacePoints:
+        """The position of the new or moved point on the surface, as a point of the core.
+
+        It is on the side of the other control points if the curve is joined to its mirror image.
+        `moved` is the index of a control point that moves there.
+        """
+        place = self._place(opened)
+        if opened.mirror is None:
+            return place
+        if getattr(self, "image", False):
+            place = mirror_images.reflected(opened.surface, opened.mirror, place)
+        if not opened.mirror.joined:
+            return place
+        others = opened.points.places
+        if moved is not None:
+            others = point_lists.without_point(others, moved)
+        return mirror_images.on_given_side(opened.surface, opened.mirror, place, others)
+
+    def _place(self, opened: Opened) -> SurfacePoints:
+        """The position that is given, or under the mouse."""
         if self.dragged is not None:
             return self.dragged
         given = np.array([self.position[:]], dtype=float)

@@ -54,7 +54,7 @@ _state = _State()
 def show(opened: Opened, courses: list[Course], lines: list[np.ndarray], chosen: int) -> None:
     """Draw courses, whose lines are in the local space of the mesh."""
     _state.shown = _Shown(opened, courses, lines, chosen)
-    overlay.show_dragged(opened, courses[chosen].curve)
+    overlay.show_dragged(opened, courses[chosen].curves)
     redraw()
 
 
@@ -72,7 +72,7 @@ def hide() -> None:
 
 def lines_of(opened: Opened, courses: list[Course]) -> list[np.ndarray]:
     """The points of courses in the local space of the mesh."""
-    return [edited_curve.polyline_of(opened.surface, course.curve) for course in courses]
+    return [edited_curve.polyline_of(opened.surface, course.curves[0]) for course in courses]
 
 
 def energy_text(course: Course) -> str:

@@ -8,6 +8,7 @@ import bpy
 from ..operators.error_reports import called, with_error_reports
 from ..operators.sliced_operator import SlicedOperator
 from ..scene import surface_cache
+from ..scene.messages import InputError
 from . import modes, picking
 from .picking import Kind
 
@@ -106,9 +107,16 @@ def _call_of(
     named = {"curve": hit.name, "position": hit.position, "from_mouse": True}
     if hit.kind is Kind.VIA:
         return calls.move_via_point, {**named, "index": hit.index}
+    if hit.kind in {Kind.POINT, Kind.LINE}:
+        named["image"] = hit.is_image
     if via:
         if hit.kind is not Kind.LINE:
             return None
+        if not hit.index:
+            raise InputError(
+                "The leg from the first point to its mirror image has no via points. Drag from "
+                "another leg"
+            )
         return calls.add_via_point, {**named, "leg": hit.index - 1}
     if hit.kind is Kind.CURVE:
         return calls.activate_curve, {"curve": hit.name}

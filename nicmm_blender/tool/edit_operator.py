@@ -10,6 +10,7 @@ import numpy as np
 from .. import settings
 from ..operators import polls
 from ..operators.answers import answer_now
+from ..operators.asymmetry_report import asymmetry_text
 from ..operators.error_reports import with_error_reports
 from ..operators.followers import follow_now
 from ..outputs import edited_curve
@@ -22,7 +23,7 @@ from ..scene.via_points import ViaPoints, no_via_points, sorted_by_leg
 from . import modes
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve
+    from ...nicmm_core import Design
 
 OBJECT_SETTINGS = ("spline", "radius", "thickness", "offset")
 """Properties of a new curve object, shown in the redo panel."""
@@ -105,11 +106,13 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         mesh_object = curve_record.mesh_of_context(context)
-        for name in ("closed", "smoothness", "normal_bending", "use_modifiers"):
+        for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(self, name)
+        settings.draw_mirror(layout, self, mesh_object)
+        layout.prop(self, "use_modifiers")
         for name in edited_curve.MAPS:
             layout.prop_search(self, name, mesh_object, "vertex_groups")
-        layout.prop(self, "avoid_others")
+        settings.draw_avoid_others(layout, self)
         layout.prop(self, "clearance")
         if not self.curve:
             for name in ("output", *OBJECT_SETTINGS):
@@ -161,12 +164,13 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             opened = replace(opened, via=self._given_via_points(opened), curve=None)
         is_outdated = edited is not None and not edited_curve.is_current(edited, opened)
         if len(self.points) or changes_corners or is_outdated or opened.curve is None:
-            curves = _design_curves(context, opened, points)
+            design = _design(context, opened, points)
+            curves, remark = design.curves, asymmetry_text(context.scene, opened.surface, design)
         else:
-            curves = [opened.curve]
+            curves, remark = opened.curves, ""
         result = edited_curve.write(context, opened, points, curves, self)
         self._store(opened, points)
-        report = f'"{result.name}" through {len(points)} points{opened.remark}'
+        report = f'"{result.name}" through {len(points)} points{remark}{opened.remark}'
         remarks = follow_now(context, [result])
         self.report({"WARNING" if remarks else "INFO"}, "; ".join([report, *remarks]))
         return {"FINISHED"}
@@ -206,14 +210,13 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             stored.leg, stored.position = leg, position
 
 
-def _design_curves(
-    context: bpy.types.Context, opened: Opened, points: ControlPoints
-) -> "list[SurfaceCurve]":
-    """The curve through points, as a list; an error if there is none."""
+def _design(context: bpy.types.Context, opened: Opened, points: ControlPoints) -> "Design":
+    """The design of the curve through points; an error if there is none."""
     requests = edited_curve.request(opened, points)
     if not requests:
         raise InputError(TOO_FEW_POINTS)
-    return edited_curve.curves_of(answer_now(context, requests))
+    (answer,) = answer_now(context, requests)
+    return edited_curve.design_of(answer)
 
 
 def register() -> None:

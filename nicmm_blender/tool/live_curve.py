@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..scene import surface_cache
+from ..scene import design_request, surface_cache
 from ..scene.design_request import DesignRequest, message_of
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ class LiveCurve:
         self.request, self.keeps_course = request, keeps_course
         self.waiting, self.steps_left = request.start is None or not keeps_course, 0
         self.problem = ""
+        self.image: SurfaceCurve | None = None
 
     @property
     def curve(self) -> SurfaceCurve | None:
@@ -56,6 +57,21 @@ class LiveCurve:
 
         found = self.request.start
         return found.curves[0] if isinstance(found, nicmm.Design) else found
+
+    @property
+    def curves(self) -> list[SurfaceCurve]:
+        """The last curve, and its mirror image if the request asks for a pair."""
+        return [each for each in (self.curve, self.image) if each is not None]
+
+    @property
+    def design(self) -> Design | None:
+        """The last design, with the mirror image of a pair; None if it has not converged."""
+        from ... import nicmm_core as nicmm
+
+        found = self.request.start
+        if self.steps_left or not isinstance(found, nicmm.Design):
+            return None
+        return replace(found, curves=self.curves)
 
     def move(self, points: ControlPoints) -> None:
         """Move the control points, or a via point, and take a first step."""
@@ -71,7 +87,9 @@ class LiveCurve:
         if isinstance(design, Exception):
             self.problem = str(design)
         elif design.curves:
-            self.request, self.problem = replace(self.request, start=design), ""
+            self.image = design.curves[1] if len(design.curves) > 1 else None
+            start = design_request.without_image(design)
+            self.request, self.problem = replace(self.request, start=start), ""
 
     def step(self) -> None:
         """Continue for a few iterations."""
@@ -92,12 +110,14 @@ class LiveCurve:
                     start=request.start,
                     **request.options,
                 )
+                image = design_request.with_image(designer, request, design).curves[1:]
         except nicmm.CurveError:
             self.waiting, self.steps_left = True, 0
         except nicmm.NicmmError as error:
             self.problem, self.steps_left = message_of(error, request), 0
         else:
             self.request, self.problem = replace(request, start=design), ""
+            self.image = image[0] if image else None
             if design.status is not nicmm.Status.ITERATION_LIMIT:
                 self.steps_left = 0
             elif not self.steps_left:

@@ -6,6 +6,7 @@ Parts hidden by the mesh are dimmed. A mark under the mouse shows what a click w
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ from .view import OFFSET, View
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve
+    from ...nicmm_core.geometry.plane_section import PlaneSection
 
 Colour = tuple[float, ...]
 """Red, green and blue, and possibly opacity."""
@@ -35,8 +37,12 @@ Colour = tuple[float, ...]
 HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
+IMAGE, PLANE = 0.6, 0.35
+"""Opacity of mirror images of control points, and of the line where a mirror cuts the mesh."""
+
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
-RING_RADIUS, HOLE_RADIUS = 6.5, 4.5
+RING_RADIUS, HOLE_RADIUS, IMAGE_HOLE = 6.5, 4.5, 3.0
+PLANE_WIDTH = 1.0
 """Sizes in pixels at a resolution scale of 1."""
 
 DISC_SIDES = 20
@@ -48,19 +54,10 @@ OUTLINE = (0.05, 0.05, 0.05)
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Points, (k, 3), via points, (m, 3), and line, (n, 3), in the local space of a mesh object.
+    """A curve with its points, and what its lines are: those of a curve, or of a pair."""
 
-    `corners` and `junctions`, (k,), tell which of the points are corners, and which lie on other
-    curves.
-    """
-
-    mesh_uid: int
-    surface: Surface
-    points: np.ndarray
-    corners: np.ndarray
-    junctions: np.ndarray
-    via: np.ndarray
-    line: np.ndarray
+    opened: Opened
+    lines: list[np.ndarray]
     problem: str = ""
     radius: float = 0.0
 
@@ -76,8 +73,10 @@ class _State:
         """Draw nothing."""
         self.dragged: _Drawn | None = None
         self.hover: picking.Hit | None = None
-        self.batch: gpu.types.GPUBatch | None = None
-        self.batch_of: np.ndarray | None = None
+        self.batches: list[gpu.types.GPUBatch] = []
+        self.batches_of: list[np.ndarray] = []
+        self.plane: gpu.types.GPUBatch | None = None
+        self.plane_of: PlaneSection | None = None
         self.visible: np.ndarray = np.zeros(0, dtype=bool)
         self.visible_of: tuple[bytes, bool, int, bytes] | None = None
 
@@ -85,20 +84,11 @@ class _State:
 _state = _State()
 
 
-def show_dragged(edited: Opened, curve: SurfaceCurve | None, problem: str = "") -> None:
+def show_dragged(edited: Opened, curves: list[SurfaceCurve], problem: str = "") -> None:
     """Draw a curve that is being changed, with its changed points, instead of the active one."""
     _state.hover = None
-    _state.dragged = _Drawn(
-        edited.mesh_uid,
-        edited.surface,
-        edited.positions(),
-        edited.points.corners,
-        edited.junctions,
-        edited.via_positions(),
-        edited_curve.polyline_of(edited.surface, curve),
-        problem,
-        radius_of(edited),
-    )
+    lines = [edited_curve.polyline_of(edited.surface, curve) for curve in curves]
+    _state.dragged = _Drawn(edited, lines, problem, radius_of(edited))
 
 
 def show_active() -> None:
@@ -135,23 +125,14 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
-    return _Drawn(
-        opened.mesh_uid,
-        opened.surface,
-        opened.positions(),
-        opened.points.corners,
-        opened.junctions,
-        opened.via_positions(),
-        opened.polyline(),
-        "",
-        radius_of(opened),
-    )
+    return _Drawn(opened, opened.lines(), "", radius_of(opened))
 
 
 def _hover_on(drawn: _Drawn) -> picking.Hit | None:
     """What is marked under the mouse on the drawn mesh, or None; nothing is marked in a drag."""
     hit = _state.hover
-    marks = hit is not None and hit.mesh_uid == drawn.mesh_uid and _state.dragged is None
+    is_here = hit is not None and hit.mesh_uid == drawn.opened.mesh_uid
+    marks = is_here and _state.dragged is None
     return hit if marks else None
 
 
@@ -164,20 +145,22 @@ def radius_of(opened: Opened) -> float:
 def _draw_lines() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
+    if drawn is None or (mesh_object := by_uid(drawn.opened.mesh_uid)) is None:
         return
-    colours = Colours(context)
-    nearer = towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
-    if len(drawn.line):
-        colour = colours.problem if drawn.problem else colours.line
-        draw_line(context, nearer, _line_batch(drawn.line), colour)
+    colours, surface = Colours(context), drawn.opened.surface
+    if (plane := _plane_batch(drawn.opened)) is not None:
+        nearer = towards_the_eye(context.region_data, mesh_object, surface, 0.0)
+        layers = [(PLANE_WIDTH, colours.point)]
+        draw_layers(context, nearer, plane, layers, PLANE)
+    nearer = towards_the_eye(context.region_data, mesh_object, surface, drawn.radius)
+    colour = colours.problem if drawn.problem else colours.line
+    for batch in _line_batches(drawn.lines):
+        draw_line(context, nearer, batch, colour)
     hit = _hover_on(drawn)
     if hit is not None and hit.kind is Kind.CURVE:
         for line in picking.other_lines(context):
             if line.name == hit.name and len(line.positions) > 1:
-                nearer = towards_the_eye(
-                    context.region_data, mesh_object, drawn.surface, line.radius
-                )
+                nearer = towards_the_eye(context.region_data, mesh_object, surface, line.radius)
                 draw_line(context, nearer, batch_of_line(line.positions), colours.hover)
 
 
@@ -189,18 +172,33 @@ def draw_line(
     line_width: float = LINE_WIDTH,
 ) -> None:
     """Draw a line with an outline; parts that the mesh hides are dimmed."""
+    layers = [(line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)]
+    draw_layers(context, matrix, batch, layers)
+
+
+def draw_layers(
+    context: bpy.types.Context,
+    matrix: Matrix,
+    batch: gpu.types.GPUBatch,
+    layers: Sequence[tuple[float, Colour]],
+    shown: float = 1.0,
+) -> None:
+    """Draw a line several times, with other widths and colours; hidden parts are dimmed.
+
+    `shown` is the opacity of the other parts.
+    """
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region, scale = context.region, context.preferences.system.ui_scale
-    hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
+    hidden = shown if picking.is_xray(context.space_data) else HIDDEN * shown
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_mask_set(False)
     with gpu.matrix.push_pop():
         gpu.matrix.load_matrix(matrix)
         shader.bind()
         shader.uniform_float("viewportSize", (region.width, region.height))
-        for width, shade in ((line_width + 2.0 * OUTLINE_WIDTH, OUTLINE), (line_width, colour)):
+        for width, shade in layers:
             shader.uniform_float("lineWidth", width * scale)
-            for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", 1.0)):
+            for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", shown)):
                 gpu.state.depth_test_set(test)
                 shader.uniform_float("color", (*shade[:3], opacity))
                 batch.draw(shader)
@@ -208,11 +206,27 @@ def draw_line(
     gpu.state.blend_set("NONE")
 
 
-def _line_batch(line: np.ndarray) -> gpu.types.GPUBatch:
-    """The batch of the active line, rebuilt only if the line has changed."""
-    if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
-        _state.batch, _state.batch_of = batch_of_line(line), line
-    return _state.batch
+def _line_batches(lines: list[np.ndarray]) -> list[gpu.types.GPUBatch]:
+    """The batches of the active lines, rebuilt only if the lines have changed."""
+    before = _state.batches_of
+    same = len(before) == len(lines) and all(map(np.array_equal, before, lines))
+    if not same:
+        _state.batches, _state.batches_of = [batch_of_line(line) for line in lines], lines
+    return _state.batches
+
+
+def _plane_batch(opened: Opened) -> gpu.types.GPUBatch | None:
+    """The batch of the line where the mirror cuts the mesh; None without such a line."""
+    section = opened.section
+    if section is None or not len(section.faces):
+        return None
+    if _state.plane is None or _state.plane_of is not section:
+        shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+        faces = np.repeat(section.faces, 2)
+        ends = opened.surface.points(faces, section.barycentric.reshape(-1, 3))
+        _state.plane = batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+        _state.plane_of = section
+    return _state.plane
 
 
 def batch_of_line(line: np.ndarray) -> gpu.types.GPUBatch:
@@ -224,39 +238,22 @@ def batch_of_line(line: np.ndarray) -> gpu.types.GPUBatch:
 def _draw_points() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
+    if drawn is None or (mesh_object := by_uid(drawn.opened.mesh_uid)) is None:
         return
-    view = picking.view_on(context, mesh_object, drawn.surface)
-    colours = Colours(context)
-    positions, marked = np.concatenate([drawn.points, drawn.via]), -1
-    fills, n_points = [colours.point] * len(positions), len(drawn.points)
-    hit = _hover_on(drawn)
-    if hit is not None:
-        if hit.kind is Kind.POINT and hit.index < n_points:
-            fills[hit.index] = colours.hover
-        elif hit.kind is Kind.VIA and hit.index < len(drawn.via):
-            fills[n_points + hit.index] = colours.hover
-        elif hit.kind in {Kind.LINE, Kind.JUNCTION, Kind.SURFACE}:
-            marked = len(positions)
-            positions = np.concatenate([positions, [hit.position]])
-            fills.append(colours.hover)
-    if not len(positions):
+    view = picking.view_on(context, mesh_object, drawn.opened.surface)
+    marks = _marks(drawn.opened, _hover_on(drawn), Colours(context))
+    if not marks:
         return
+    positions = np.array([mark.position for mark in marks])
     centres, visible = view.project(positions), _visible(view, positions)
     scale = context.preferences.system.ui_scale
     outlines, colour_of = [], []
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
-        opacity = 1.0 if visible[number] else HIDDEN
-        # Smaller where a click would add a point, except on another curve.
-        on_curve = hit is not None and hit.kind is Kind.JUNCTION
-        size = 0.6 if number == marked and not on_curve else 1.0
-        if n_points <= number != marked:
-            shapes = _OUTLINED_RING, _RING
-        else:
-            shapes = _shapes_at(drawn, number, hit)
-        for shape, colour in zip(shapes, (OUTLINE, fills[number]), strict=True):
-            outlines.append(centres[number] + size * scale * shape)
+        mark = marks[number]
+        opacity = mark.opacity * (1.0 if visible[number] else HIDDEN)
+        for shape, colour in zip(mark.shapes, (OUTLINE, mark.fill), strict=True):
+            outlines.append(centres[number] + scale * shape)
             colour_of.append(np.tile((*colour[:3], opacity), (len(shape), 1)))
     if not outlines:
         return
@@ -275,18 +272,35 @@ def _draw_points() -> None:
     gpu.state.blend_set("NONE")
 
 
-def _shapes_at(
-    drawn: _Drawn, number: int, hit: picking.Hit | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """The outline and the filling of a control point, or of the mark where one would be added."""
-    if number >= len(drawn.points):
-        is_junction = hit is not None and hit.kind is Kind.JUNCTION
-        return (_OUTLINED_DIAMOND, _DIAMOND) if is_junction else (_OUTLINED_DISC, _DISC)
-    if drawn.junctions[number]:
-        if drawn.corners[number]:
-            return _OUTLINED_STAR, _STAR
-        return _OUTLINED_DIAMOND, _DIAMOND
-    return (_OUTLINED_SQUARE, _SQUARE) if drawn.corners[number] else (_OUTLINED_DISC, _DISC)
+@dataclass(frozen=True)
+class _Mark:
+    """What is drawn at a position: the outline and the filled shape, and the colour of this."""
+
+    position: np.ndarray | tuple[float, float, float]
+    shapes: tuple[np.ndarray, np.ndarray]
+    fill: Colour
+    opacity: float = 1.0
+
+
+def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_Mark]:
+    """The marks of control points and via points, of their images, and of what is hovered."""
+    hovered_is = None if hit is None else (hit.kind, hit.index, hit.is_image)
+
+    def fill(kind: Kind, index: int, is_image: bool = False) -> Colour:
+        return colours.hover if hovered_is == (kind, index, is_image) else colours.point
+
+    corners, junctions, marks = opened.points.corners, opened.junctions, []
+    for number, position in enumerate(opened.positions()):
+        shapes = _SHAPES[bool(corners[number]), bool(junctions[number])]
+        marks.append(_Mark(position, shapes, fill(Kind.POINT, number)))
+    for owner, position in zip(opened.images.owners, opened.image_positions(), strict=True):
+        shapes = _HOLLOW_SQUARES if corners[owner] else _HOLLOW_DISCS
+        marks.append(_Mark(position, shapes, fill(Kind.POINT, owner, True), IMAGE))
+    for number, position in enumerate(opened.via_positions()):
+        marks.append(_Mark(position, _RINGS, fill(Kind.VIA, number)))
+    if hit is not None and hit.kind in _SHAPES_OF_NEW_POINTS:
+        marks.append(_Mark(hit.position, _SHAPES_OF_NEW_POINTS[hit.kind], colours.hover))
+    return marks
 
 
 def _visible(view: View, positions: np.ndarray) -> np.ndarray:
@@ -314,24 +328,48 @@ def _ring(inner: float, outer: float) -> np.ndarray:
     return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
 
 
-def _square(half: float) -> np.ndarray:
-    """Triangles of a square around the origin, as consecutive corners, (6, 2)."""
-    corners = [[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]]
-    return half * np.array(corners, dtype=np.float64)
+def _square(inner: float, outer: float) -> np.ndarray:
+    """Triangles between two squares around the origin, as consecutive corners, (24, 2)."""
+    rim = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]], dtype=np.float64)
+    (a, b), (c, d) = ((half * rim[:-1], half * rim[1:]) for half in (inner, outer))
+    return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
 
 
-_DISC = _ring(0.0, POINT_RADIUS)
-_OUTLINED_DISC = _ring(0.0, POINT_RADIUS + OUTLINE_WIDTH)
-_RING = _ring(HOLE_RADIUS, RING_RADIUS)
-_OUTLINED_RING = _ring(HOLE_RADIUS - OUTLINE_WIDTH, RING_RADIUS + OUTLINE_WIDTH)
-_SQUARE = _square(POINT_RADIUS)
-_OUTLINED_SQUARE = _square(POINT_RADIUS + OUTLINE_WIDTH)
+def _outlined(
+    shape: Callable[[float, float], np.ndarray], inner: float, outer: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """A shape, and before it a larger one that shows as its outline."""
+    outline = shape(max(inner - OUTLINE_WIDTH, 0.0), outer + OUTLINE_WIDTH)
+    return outline, shape(inner, outer)
+
+
+_DISCS, _HOLLOW_DISCS = (_outlined(_ring, hole, POINT_RADIUS) for hole in (0.0, IMAGE_HOLE))
+_SMALL_DISCS = 0.6 * _DISCS[0], 0.6 * _DISCS[1]  # where a click would add a point
+_SQUARES, _HOLLOW_SQUARES = (_outlined(_square, hole, POINT_RADIUS) for hole in (0.0, IMAGE_HOLE))
+_RINGS = _outlined(_ring, HOLE_RADIUS, RING_RADIUS)
 _TURN = np.array([[1.0, 1.0], [-1.0, 1.0]])
 """A turn by 45 degrees that enlarges by the square root of 2, so that a diamond is as wide as a
 disc with a rim."""
-_DIAMOND, _OUTLINED_DIAMOND = _SQUARE @ _TURN, _OUTLINED_SQUARE @ _TURN
-_STAR = np.concatenate([_SQUARE, _DIAMOND / np.sqrt(2.0)])
-_OUTLINED_STAR = np.concatenate([_OUTLINED_SQUARE, _OUTLINED_DIAMOND / np.sqrt(2.0)])
+_DIAMONDS = _SQUARES[0] @ _TURN, _SQUARES[1] @ _TURN
+_STARS = tuple(
+    np.concatenate([square, diamond / np.sqrt(2.0)])
+    for square, diamond in zip(_SQUARES, _DIAMONDS, strict=True)
+)
+
+_SHAPES = {
+    (False, False): _DISCS,
+    (True, False): _SQUARES,
+    (False, True): _DIAMONDS,
+    (True, True): _STARS,
+}
+"""Shapes of control points, by whether they are corners and whether they lie on other curves."""
+
+_SHAPES_OF_NEW_POINTS = {
+    Kind.LINE: _SMALL_DISCS,
+    Kind.SURFACE: _SMALL_DISCS,
+    Kind.JUNCTION: _DIAMONDS,
+}
+"""Shapes of the mark where a click would add a point, by what is under the mouse."""
 
 
 def towards_the_eye(

@@ -17,14 +17,15 @@ from mathutils import Vector
 from ..operators import polls
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
-from ..scene import curve_record, surface_cache
+from ..scene import curve_record, mirror_images, surface_cache
 from ..scene.lookup import by_uid, is_in
 from ..scene.messages import InputError
 from ..scene.surface import Surface
+from . import mirror_snap
 from .view import View, view_of
 
 if TYPE_CHECKING:
-    from ...nicmm_core import Mesh, SurfaceCurve, SurfacePoints
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
@@ -62,6 +63,8 @@ class Hit:
         Position in the local space of the mesh object.
     mesh_uid : int
         The session_uid of the mesh object.
+    is_image : bool
+        Whether the place is on the mirror image of the point or curve.
     """
 
     kind: Kind
@@ -69,6 +72,7 @@ class Hit:
     index: int
     position: tuple[float, float, float]
     mesh_uid: int
+    is_image: bool = False
 
 
 @dataclass(frozen=True)
@@ -214,16 +218,21 @@ def _hit(
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
     if number is not None:
         return Hit(Kind.POINT, name, number, tuple(positions[number]), opened.mesh_uid)
+    images = opened.image_positions()
+    number = view.nearest_point(pixel, images, POINT_REACH * scale)
+    if number is not None:
+        owner, position = int(opened.images.owners[number]), tuple(images[number])
+        return Hit(Kind.POINT, name, owner, position, opened.mesh_uid, is_image=True)
     via = opened.via_positions()
     number = view.nearest_point(pixel, via, POINT_REACH * scale)
     if number is not None:
         return Hit(Kind.VIA, name, number, tuple(via[number]), opened.mesh_uid)
     reach = CURVE_REACH * scale
     radius = 0.0 if curve is None else radius_of(curve, opened.surface)
-    if opened.curve is not None:
-        on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
+    for each, positions_along in zip(opened.curves, opened.lines(), strict=True):
+        on_line = view.nearest_on_line(pixel, positions_along, reach, radius)
         if on_line is not None:
-            return _on_line(opened, opened.curve, view.mesh, name, *on_line)
+            return _on_line(opened, each, view, name, scale, *on_line)
     if curve is not None and (place := junction_at(context, view, pixel, opened)) is not None:
         position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
         return Hit(Kind.JUNCTION, name, len(positions), position, opened.mesh_uid)
@@ -235,6 +244,8 @@ def _hit(
     place = view.surface_point_at(pixel)
     if place is None:
         return None
+    if mirror_snap.may_end_on_plane(opened):
+        place = mirror_snap.snapped(view, opened, place, scale)
     position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
     return Hit(Kind.SURFACE, name, len(positions), position, opened.mesh_uid)
 
@@ -270,14 +281,26 @@ def junction_at(
 
 
 def _on_line(
-    opened: Opened, curve: SurfaceCurve, mesh: Mesh, name: str, segment: int, share: float
+    opened: Opened,
+    curve: SurfaceCurve,
+    view: View,
+    name: str,
+    scale: float,
+    segment: int,
+    share: float,
 ) -> Hit:
     from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
 
-    place = point_on_segment(mesh, curve, segment, share)
-    number = leg_of_segment(curve, segment) + 1
+    place = point_on_segment(view.mesh, curve, segment, share)
+    leg = leg_of_segment(curve, segment)
+    if opened.mirror is not None and opened.mirror.joined:
+        half = mirror_images.half_of(opened.surface, opened.mirror, opened.points.places)
+        leg = half.leg_of(leg)
+        if mirror_snap.may_be_inserted_on_plane(opened, leg + 1):
+            place = mirror_snap.snapped(view, opened, place, scale)
     position = opened.surface.points(place.faces, place.barycentric)[0]
-    return Hit(Kind.LINE, name, number, tuple(position), opened.mesh_uid)
+    is_image = curve is opened.image
+    return Hit(Kind.LINE, name, leg + 1, tuple(position), opened.mesh_uid, is_image)
 
 
 def _read(context: bpy.types.Context) -> tuple[Opened, list[Line]]:
@@ -286,7 +309,7 @@ def _read(context: bpy.types.Context) -> tuple[Opened, list[Line]]:
     if mesh_object is None:
         raise InputError(polls.NO_MESH_OR_CURVE)
     uid = 0 if curve is None else curve.session_uid
-    panel = context.scene.nicmm_curves.use_modifiers
+    panel = curve_record.settings_from(context.scene.nicmm_curves)
     # Another viewport may be in local view and show other curves.
     view = 0 if context.space_data is None else context.space_data.as_pointer()
     key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode, view
@@ -316,10 +339,10 @@ def _other_lines(
             on = surface if is_same else surface_cache.cached(mesh_object, settings.use_modifiers)
             if on is None:  # read later, see `is_ready`
                 continue
-            _, line = curve_record.positions_of(curve, on)
+            found = curve_record.lines_of(curve, on)
         except (InputError, NicmmError):
             continue  # the error is reported where the curve is used
-        lines.append(Line(curve.name, line, radius_of(curve, surface)))
+        lines += [Line(curve.name, line, radius_of(curve, surface)) for line in found]
     return lines
 
 

@@ -22,7 +22,7 @@ from ..outputs import edited_curve, writing
 from ..outputs.edited_curve import Opened
 from ..scene.design_request import DesignRequest
 from ..scene.viewports import NAVIGATION, redraw
-from . import overlay, picking
+from . import mirror_snap, overlay, picking
 from .changes_points import ChangesPoints
 from .live_curve import LiveCurve
 
@@ -55,6 +55,10 @@ class PointDrag(ChangesPoints):
     _scratch = None
     _is_dragging = False
 
+    def may_be_on_plane(self, _opened: Opened) -> bool:
+        """Whether the point may be on the plane of a mirror, so that it snaps to it."""
+        return False
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.from_mouse:
             return super().invoke(context, event)
@@ -77,6 +81,7 @@ class PointDrag(ChangesPoints):
         if requests:  # until there is another curve, the present one is shown
             shown = replace(requests[0], start=self._opened.curve)
             self._live = LiveCurve(shown, keeps_course=not self.searches_course)
+            self._live.image = self._opened.image
         self._preview = _Preview(self._opened)
         self._last_move = 0.0
         if self._live is not None and self._is_new:
@@ -135,12 +140,15 @@ class PointDrag(ChangesPoints):
         self._last_move = time.monotonic()
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
         place = None
-        if self.snaps:
+        if self.snaps and not getattr(self, "image", False):  # others are avoided by the curve
             place = picking.junction_at(context, self._view, pixel + self._grip, self._opened)
         if place is None:
             place = self._view.surface_point_at(pixel + self._grip)
         if place is None:
             return
+        if self.may_be_on_plane(self._opened):
+            scale = context.preferences.system.ui_scale
+            place = mirror_snap.snapped(self._view, self._opened, place, scale)
         self._stop_scratch()
         self.dragged = place
         if self._live is not None:
@@ -172,31 +180,28 @@ class PointDrag(ChangesPoints):
 
     def _show_drag(self) -> None:
         edited, live = self.edited(self._opened), self._live
-        curve = None if live is None else live.curve
+        curves = [] if live is None else live.curves
         problem = "" if live is None else live.problem
-        overlay.show_dragged(edited, curve, problem)
-        if live is not None and curve is not None and live.request.start is not self._opened.curve:
-            self._preview.show(curve)
+        overlay.show_dragged(edited, curves, problem)
+        if live is not None and curves and live.request.start is not self._opened.curve:
+            self._preview.show(curves)
         redraw()
 
     def _release(self, context: bpy.types.Context) -> set[str]:
-        from ... import nicmm_core as nicmm
-
         live, opened = self._live, self._opened
         moved = np.isnan(self._pressed).any()
         if not moved and not self._is_new:
             self._end_drag(context)
             return {"CANCELLED"}
         self._edited = edited = self.edited(opened)
-        place = self.place(opened)
+        place = self._place(opened)
         self.position = opened.surface.points(place.faces, place.barycentric)[0]
         requests = edited_curve.request(edited, edited.points)
         design = None
         if live is not None and not live.waiting and not live.problem:
             # Keep the curve that the user sees: go on from it, or take it if it has converged.
             requests = [live.request]
-            if not live.steps_left and isinstance(live.request.start, nicmm.Design):
-                design = live.request.start
+            design = live.design
         self._end_drag(context)
         return with_error_reports(self, lambda: self._commit(context, requests, design))
 
@@ -206,7 +211,7 @@ class PointDrag(ChangesPoints):
         if design is not None:
             return self.end(context, requests, [design])
         # The points stay visible during a long computation.
-        overlay.show_dragged(self._edited, self._opened.curve)
+        overlay.show_dragged(self._edited, self._opened.curves)
         result: set[str] = set()
         try:
             result = self.answer(context, requests)
@@ -254,8 +259,8 @@ class _Preview:
         self._opened = opened
         self._original = self._copy = ""
 
-    def show(self, curve: SurfaceCurve) -> None:
-        """Draw a curve."""
+    def show(self, curves: list[SurfaceCurve]) -> None:
+        """Draw a curve, or a pair."""
         shown = self._opened.curve_object
         if shown is None:
             return
@@ -263,7 +268,7 @@ class _Preview:
             copy = shown.data.copy()
             self._original, self._copy = shown.data.name, copy.name
             shown.data = copy
-        writing.show_unfinished(shown, self._opened.surface, curve)
+        writing.show_unfinished(shown, self._opened.surface, curves)
 
     def restore(self) -> None:
         """Give the object its original data back."""

@@ -16,7 +16,7 @@ from ..scene import curve_record
 from ..scene.control_points import ControlPoints
 from ..scene.messages import InputError
 from ..settings import CURVE
-from . import modes, picking
+from . import mirror_snap, modes, picking
 from .changes_points import ChangesPoints
 from .point_drag import PointDrag
 
@@ -68,6 +68,9 @@ class NICMM_OT_add_point(PointDrag, bpy.types.Operator):
     def changed_via(self, opened: Opened) -> "ViaPoints":
         return edited_curve.via_after_insertion(opened, len(opened.points), self.place(opened))
 
+    def may_be_on_plane(self, opened: Opened) -> bool:
+        return mirror_snap.may_end_on_plane(opened)
+
 
 class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
     """Insert a control point between two control points of a curve"""
@@ -85,6 +88,7 @@ class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
     )
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
+    image: ChangesPoints.IMAGE
 
     def changed(self, opened: Opened) -> ControlPoints:
         count = len(opened.points)
@@ -94,6 +98,9 @@ class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
 
     def changed_via(self, opened: Opened) -> "ViaPoints":
         return edited_curve.via_after_insertion(opened, self.index, self.place(opened))
+
+    def may_be_on_plane(self, opened: Opened) -> bool:
+        return mirror_snap.may_be_inserted_on_plane(opened, self.index)
 
 
 class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
@@ -107,10 +114,15 @@ class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
     index: INDEX
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
+    image: ChangesPoints.IMAGE
 
     def changed(self, opened: Opened) -> ControlPoints:
         number = self.checked_index(opened)
-        return edited_curve.with_point(opened.points, number, self.place(opened), replaced=True)
+        place = self.place(opened, number)
+        return edited_curve.with_point(opened.points, number, place, replaced=True)
+
+    def may_be_on_plane(self, opened: Opened) -> bool:
+        return self.index in mirror_snap.ends(opened, len(opened.points))
 
 
 class NICMM_OT_remove_point(ChangesPoints, bpy.types.Operator):
@@ -127,7 +139,7 @@ class NICMM_OT_remove_point(ChangesPoints, bpy.types.Operator):
         return edited_curve.without_point(opened.points, self.checked_index(opened))
 
     def changed_via(self, opened: Opened) -> "ViaPoints":
-        return opened.via.after_removal(self.index, len(opened.points), opened.settings.closed)
+        return opened.via.after_removal(self.index, *opened.path)
 
 
 class NICMM_OT_add_via_point(PointDrag, bpy.types.Operator):
@@ -157,6 +169,7 @@ class NICMM_OT_add_via_point(PointDrag, bpy.types.Operator):
     )
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
+    image: ChangesPoints.IMAGE
 
     def changed_via(self, opened: Opened) -> "ViaPoints":
         place, leg = self.place(opened), edited_curve.checked_leg(opened, self.leg)

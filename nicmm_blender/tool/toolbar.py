@@ -7,6 +7,7 @@ from ..operators import curve_settings
 from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
 from ..scene import mesh_data
+from ..settings import draw_avoid_others, draw_mirror_in_header
 from . import course_overlay, modes
 from .course_choice import NICMM_OT_choose_course
 from .draw_operator import NICMM_OT_draw_on_surface
@@ -85,7 +86,8 @@ class _SurfaceCurve:
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(properties, name)
-        layout.prop(properties, "avoid_others", text="Avoid Others")  # the header is narrow
+        draw_avoid_others(layout, properties, "Avoid Others")  # the header is narrow
+        draw_mirror_in_header(layout, properties)
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is not None:
             for name in ("obstacle_group", "alignment_group"):

@@ -334,13 +334,48 @@ def meeting_only_at_junctions(
 
 def _crossed(mesh: Mesh, curve: SurfaceCurve, avoided: list[Avoided]) -> int | None:
     """Index of an avoided curve that a curve meets elsewhere than at junctions, or None."""
+    return next((number for number, each in enumerate(avoided) if meets(mesh, curve, each)), None)
+
+
+def meets(mesh: Mesh, curve: SurfaceCurve, avoided: Avoided) -> bool:
+    """Whether a curve meets an avoided curve elsewhere than at junctions."""
     points = curve.points[curve.control_index[curve.control_index >= 0]]
-    for number, each in enumerate(avoided):
-        meeting = meeting_places(mesh, curve, each.curve)
-        away = cdist(meeting, points).min(axis=1, initial=np.inf)
-        if (away > MEETING * mesh.diagonal).any():
-            return number
-    return None
+    meeting = meeting_places(mesh, curve, avoided.curve)
+    away = cdist(meeting, points).min(axis=1, initial=np.inf)
+    return bool((away > MEETING * mesh.diagonal).any())
+
+
+def is_too_close(
+    mapped: MappedMesh, curve: SurfaceCurve, avoided: Avoided, clearance: float
+) -> bool:
+    """Whether a curve comes closer to an avoided curve than the clearance.
+
+    Parameters
+    ----------
+    mapped : MappedMesh
+        Map from the given mesh to a manifold.
+    curve : SurfaceCurve
+        A curve on the manifold. Its points and the middles of its segments count.
+    avoided : Avoided
+        A curve on the given mesh.
+    clearance : float
+        It does not count near junctions.
+    """
+    segments = _with_clearance(mapped, avoided, clearance)
+    if not len(segments):
+        return False
+    curve, faces = checked_curve(mapped.mesh, curve, across_gaps=True)
+    faces = faces if curve.closed else faces[:-1]
+    index = np.arange(len(faces))
+    start, end = (
+        weights_in_faces(mapped.mesh, curve.faces[ends], curve.barycentric[ends], faces)
+        for ends in (index, (index + 1) % len(curve.faces))
+    )
+    distances = _distances(mapped.mesh, segments, clearance)
+    return any(
+        bool((distances.at(SurfacePoints(faces, weights)) < clearance).any())
+        for weights in (start, 0.5 * (start + end), end)
+    )
 
 
 def _with_clearance(mapped: MappedMesh, avoided: Avoided, clearance: float) -> FaceSegments:

@@ -170,9 +170,10 @@ class Abuse(RuleBasedStateMachine):
     def insert_point(self, direction, index):
         self.call(bpy.ops.nicmm.insert_point, position=self.place(direction), index=index)
 
-    @rule(direction=DIRECTIONS, index=st.integers(0, 6))
-    def move_point(self, direction, index):
-        self.call(bpy.ops.nicmm.move_point, position=self.place(direction), index=index)
+    @rule(direction=DIRECTIONS, index=st.integers(0, 6), image=st.booleans())
+    def move_point(self, direction, index, image):
+        place = self.place(direction)
+        self.call(bpy.ops.nicmm.move_point, position=place, index=index, image=image)
 
     @rule(index=st.integers(0, 6))
     def remove_point(self, index):
@@ -206,6 +207,11 @@ class Abuse(RuleBasedStateMachine):
                 ("radius", 0.0),
                 ("radius", 0.1),
                 ("use_modifiers", False),
+                ("mirror_axis", "NONE"),
+                ("mirror_axis", "X"),
+                ("mirror_axis", "MODIFIER"),
+                ("mirror_as", "PAIR"),
+                ("mirror_as", "JOINED"),
                 ("obstacle_group", "Group"),
                 ("alignment_group", "Gone"),
                 ("clearance", 0.1),
@@ -242,9 +248,14 @@ class Abuse(RuleBasedStateMachine):
             vertices = [(first * step) % len(mesh.data.vertices) for step in (1, 3, 7, 11)]
             self.call(bpy.ops.nicmm.design_curve, points=", ".join(map(str, vertices)))
 
-    @rule(output=st.sampled_from(["CURVE", "STICKY", "REGION"]))
-    def set_panel(self, output):
-        bpy.context.scene.nicmm_curves.output = output
+    @rule(
+        output=st.sampled_from(["CURVE", "STICKY", "REGION"]),
+        axis=st.sampled_from(["NONE", "NONE", "Y", "MODIFIER"]),
+        how=st.sampled_from(["JOINED", "PAIR"]),
+    )
+    def set_panel(self, output, axis, how):
+        panel = bpy.context.scene.nicmm_curves
+        panel.output, panel.mirror_axis, panel.mirror_as = output, axis, how
 
     @rule(on=st.booleans())
     def live(self, on):
@@ -270,7 +281,7 @@ class Abuse(RuleBasedStateMachine):
         try:
             mesh_object, curve = picking.mesh_and_curve(bpy.context)
             if mesh_object is not None and picking.is_ready(bpy.context, mesh_object, curve):
-                picking.opened_now(bpy.context).polyline()
+                picking.opened_now(bpy.context).lines()
                 picking.other_lines(bpy.context)
         except (messages.InputError, core.NicmmError):
             return

@@ -195,7 +195,7 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     opened = module(empty_scene, "outputs.edited_curve").open_curve(bpy.context, curve)
     assert not opened.settings.closed and opened.settings.smoothness == 2.0
     np.testing.assert_allclose(opened.positions(), places, atol=ROUNDING)
-    np.testing.assert_allclose(opened.polyline(), before, atol=ROUNDING)
+    np.testing.assert_allclose(opened.lines()[0], before, atol=ROUNDING)
 
     assert edit() == curve
     np.testing.assert_allclose(scenes.points(curve), before, atol=ROUNDING)

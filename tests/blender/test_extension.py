@@ -193,15 +193,16 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
         if not is_new_curve_option:
             recorded[name] = designing[name].default
     found = asdict(record.CurveSettings())
-    assert list(found) == [
-        *recorded,
-        "avoid_others",
-        "use_modifiers",
-    ]  # the digest depends on the order
+    of_blender = {
+        "avoid_others": False,
+        "use_modifiers": True,
+        "mirror_axis": "NONE",
+        "mirror_as": "JOINED",
+    }
+    assert list(found) == [*recorded, *of_blender]  # the digest depends on the order
     assert recorded["normal_bending"] == pytest.approx(scenes.NORMAL_BENDING)
     # Records from before there was this setting keep the curve as it is.
-    unlisted = {"avoid_others": False, "use_modifiers": True}
-    assert found == {**recorded, "normal_bending": 0.0, **unlisted}
+    assert found == {**recorded, "normal_bending": 0.0, **of_blender}
     added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
     whole = table.Option("turns", table.Kind.COUNT, 1, "Turns", "Winds", limits=(0.0, 9.0))
     made = settings.properties_of((*table.OPTIONS, added, whole))

@@ -408,7 +408,7 @@ def test_a_preview_leaves_no_trace(empty_scene, sphere, places, output):
     count = len(bpy.data.curves) + len(bpy.data.hair_curves)
     live.move(moved(sphere.closest_point_on_mesh([*places[1][:2], 0.0])[1]))
     for _ in range(3):
-        preview.show(live.curve)
+        preview.show(live.curves)
     assert content() != before and curve.data != data
     preview.restore()
     assert content() == before and curve.data == data

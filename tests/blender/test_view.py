@@ -76,7 +76,7 @@ def test_only_what_is_visible_is_picked(empty_scene):
         found = view.nearest_point(pixel + [3.0, 0.0], positions, 10.0)
         assert found == (number if visible[number] else None)
         assert through.nearest_point(pixel + [3.0, 0.0], positions, 10.0) == number
-    line = opened.polyline()
+    line = opened.lines()[0]
     segment = int(np.flatnonzero(view.visible(line))[10])
     pixel = view.project(0.5 * line[[segment]] + 0.5 * line[[segment + 1]])[0]
     found = view.nearest_on_line(pixel, line, 5.0)

@@ -374,3 +374,48 @@ def test_five_curves_on_one_mesh(kind, seed):
                 assert least_distance(mesh, curve, other, clearance / 6) >= LEAST * clearance
         curves.append(curve)
         free[points] = False
+
+
+class TestCheckAvoids:
+    """The check of mirror images, which are not relaxed."""
+
+    MIRROR = ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+    def image(self, plate, height, start=-0.3):
+        points = flat((start, -height), (0.3, -height))
+        return nicmm.mirrored(plate, nicmm.design_curve(plate, points, closed=False), self.MIRROR)
+
+    @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.09), (0.1, 0.0), (0.02, 0.019)])
+    def test_far_enough(self, plate, line, height, clearance):
+        image = self.image(plate, height)
+        assert distance_in_plane(image.curves[0], line.curves[0]) == pytest.approx(height, rel=0.02)
+        nicmm.Designer(plate).check_avoids(image, [line], clearance)
+
+    @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.11), (0.02, 0.021)])
+    def test_too_close(self, plate, line, height, clearance):
+        image = self.image(plate, height)
+        with pytest.raises(nicmm.UnreachableError, match=r"design comes closer to avoid\[1\]"):
+            far = nicmm.design_curve(plate, flat((-0.5, 0.6), (0.5, 0.6)), closed=False)
+            nicmm.Designer(plate).check_avoids(image, [far, line], clearance)
+
+    def test_crossing(self, plate, line):
+        crossing = nicmm.design_curve(plate, flat((0.0, -0.3), (0.1, 0.3)), closed=False)
+        with pytest.raises(nicmm.UnreachableError, match=r"design crosses avoid\[0\]"):
+            nicmm.Designer(plate).check_avoids(crossing, [line])
+
+    @pytest.mark.parametrize("clearance", [0.0, CLEARANCE])
+    def test_control_points_are_junctions(self, plate, line, clearance):
+        points = np.stack([[0.1, 0.4, 0.0], on_curve(line.curves[0], 0.5)])
+        ending = nicmm.design_curve(plate, points, closed=False)
+        nicmm.Designer(plate).check_avoids(ending, [line], clearance)
+
+    def test_on_a_defective_mesh(self, plate):
+        """The distance is measured on the repaired surface."""
+        mesh = changed(plate, "soup", seed=1).mesh
+        line, other = (
+            nicmm.design_curve(mesh, flat((-0.5, height), (0.5, height)), closed=False)
+            for height in (-0.05, 0.05)
+        )
+        nicmm.Designer(mesh).check_avoids(other, [line], 0.09)
+        with pytest.raises(nicmm.UnreachableError, match="than the clearance"):
+            nicmm.Designer(mesh).check_avoids(other, [line], 0.11)

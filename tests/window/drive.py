@@ -33,6 +33,13 @@ SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-
 ACROSS, BEHIND = ((-0.45, -0.05), (0.0, 0.0), (0.45, -0.05)), ((-0.42, 0.45), (0.0, 0.5))
 """Sideways and backwards on the crown: a curve across it, and the beginning of one behind it."""
 
+
+HALF = ((0.3, 0.62), (0.45, -0.14), (-0.22, -0.62))
+"""Sideways and upwards on the front of Suzanne's head, the last one on the other side."""
+
+SYMMETRIC = 2e-3
+"""Greatest asymmetry of the points of a curve object, which are those of an even spline."""
+
 SMOOTHNESS = (150, 68)
 """Pixel of the field in the header."""
 
@@ -801,6 +808,97 @@ def shift_drag(blender: Blender, start, steps: int, each, name: str) -> None:
     drag(blender, start, steps, each, name)
 
 
+def symmetry(blender: Blender) -> None:
+    """A curve joined to its mirror image on a mirrored body, its images, the plane, and a pair."""
+    step("A mirrored body: three clicks, one of them on the other side; the Mirror modifier")
+    blender.do("helper.body('mirrored')")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    blender.do("helper.show_sidebar()")
+    blender.do("bpy.context.scene.nicmm_curves.mirror_axis = 'MODIFIER'")
+    blender.do('bpy.ops.ed.undo_push(message="Start")')
+    places = blender.do(f"value = helper.shown_in_front({HALF})")
+    blender.shot("24-mirror-modifier")
+    states = click_places(blender, places)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("24-joined")
+    check(blender.do("value = min(x for x, _, _ in helper.places())") > 0.0, "points of one side")
+    check_symmetric(blender)
+    undo_and_redo(blender, states, "of a symmetric curve")
+
+    step("Where the curve crosses the plane, the mark and the point snap to it")
+    lowest = "min(helper.line(), key=lambda place: (abs(place[0]) > 0.03, place[2]))"
+    (chin,) = blender.do(f"value = helper.pixels([{lowest}])")
+    beside = chin[0] + 4, chin[1]
+    blender.move(beside)
+    time.sleep(1.0)
+    blender.shot("24-snapped")
+    blender.click(beside)
+    count_points(blender, 4)
+    check(abs(blender.do("value = helper.places()[3][0]")) < 1e-5, "a point on the plane")
+    check_symmetric(blender)
+    time.sleep(0.6)
+
+    step("Drag a mirror image: its point follows; J and Ctrl-click act on the point")
+    before, old = state(blender), blender.do("value = helper.places()[1]")
+    (image,) = blender.do("value = helper.pixels(helper.image_places()[1])")
+    drag(blender, image, 10, (1.0, 2.0), "24-image-dragged")
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {before!r}", "the dragged curve")
+    new = blender.do("value = helper.places()[1]")
+    check(new[0] > 0.0 and math.dist(old, new) > 0.02, "the point of one side moves")
+    check_symmetric(blender)
+    dragged = state(blender)
+    (image,) = blender.do("value = helper.pixels(helper.image_places()[2])")
+    blender.move(image)
+    time.sleep(0.5)
+    blender.key("j")
+    blender.wait("helper.corners() == [2]", "a corner")
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.shot("24-corner-of-image")
+    cornered = state(blender)
+    (image,) = blender.do("value = helper.pixels(helper.image_places()[0])")
+    blender.click(image, "ctrl")
+    count_points(blender, 3)
+    undo_and_redo(blender, [before, dragged, cornered, state(blender)], "of images")
+    for _ in range(2):
+        blender.key("ctrl+z")
+    blender.wait(f"helper.state() == {dragged!r}", "undo")
+
+    step("A click on the other half inserts the mirror image; drag it away from there")
+    (on_image,) = blender.do("value = helper.pixels(helper.mirrored_middle_of_leg(1))")
+    drag(blender, on_image, 10, (1.0, -2.0))
+    blender.mouse("mouseup", 1)
+    count_points(blender, 5)
+    check(blender.do("value = min(x for x, _, _ in helper.places())") > -1e-5, "on one side")
+    check_symmetric(blender)
+    time.sleep(0.6)
+    blender.key("ctrl+z")
+    blender.wait(f"helper.state() == {dragged!r}", "undo")
+
+    step("Pair: two splines; drag a point, and an image")
+    blender.do("helper.curve().nicmm_settings.mirror_as = 'PAIR'")
+    blender.wait("len(helper.curve().data.splines) == 2", "a pair")
+    blender.shot("24-pair")
+    for name, number in (("places", 0), ("image_places", 1)):
+        before = state(blender)
+        (pixel,) = blender.do(f"value = helper.pixels(helper.{name}()[{number}])")
+        drag(blender, pixel, 10, (1.0, -2.0), f"24-pair-{name}")
+        blender.mouse("mouseup", 1)
+        blender.wait(f"helper.state() != {before!r}", "the dragged pair")
+        blender.wait("not helper.is_modal()", "the end")
+        check(blender.do("value = len(helper.curve().data.splines)") == 2, "still a pair")
+        check_symmetric(blender)
+        time.sleep(0.6)
+    blender.do("bpy.context.scene.nicmm_curves.mirror_axis = 'NONE'")
+    blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
+def check_symmetric(blender: Blender) -> None:
+    away = blender.do("value = helper.asymmetry()")
+    check(away < SYMMETRIC, f"the curve is its own mirror image ({away:.1e})")
+
+
 def part_of_way(start, end, steps: int) -> tuple[float, float]:
     """One of equal steps from a pixel to another."""
     return (end[0] - start[0]) / steps, (end[1] - start[1]) / steps
@@ -1049,6 +1147,7 @@ PARTS = {
     "courses": courses,
     "via": via_points,
     "several": several,
+    "symmetry": symmetry,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

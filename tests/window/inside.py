@@ -320,6 +320,37 @@ class Helper:
         return [list(point.co[:3]) for spline in splines for point in spline.points]
 
     @classmethod
+    def mirrored_middle_of_leg(cls, leg):
+        """The mirror image in x of the middle of a leg of the active curve."""
+        x, y, z = cls.middle_of_leg(leg)
+        return [-x, y, z]
+
+    @classmethod
+    def image_places(cls):
+        """Mirror images of the control points of the active curve, in the order of the curve."""
+        with cls.in_view():
+            picking = import_module(f"{MODULE}.tool.picking")
+            return picking.opened_now(bpy.context).image_positions().tolist()
+
+    @classmethod
+    def asymmetry(cls):
+        """Greatest distance of the active curve object to its mirror image in x, in local units."""
+        from mathutils.geometry import intersect_point_line
+
+        lines = []
+        for spline in cls.curve().data.splines:
+            points = [point.co.xyz for point in spline.points]
+            lines.append([*points, points[0]] if spline.use_cyclic_u else points)
+
+        def away(place, ends):
+            nearest, along = intersect_point_line(place, *ends)
+            return (place - (nearest if 0.0 <= along <= 1.0 else ends[along > 0.5])).length
+
+        segments = [ends for line in lines for ends in zip(line[:-1], line[1:], strict=True)]
+        images = [_vector((-point.x, point.y, point.z)) for line in lines for point in line]
+        return max(min(away(image, ends) for ends in segments) for image in images)
+
+    @classmethod
     def middle_of_leg(cls, leg):
         """The visible point of a leg of the active curve that is nearest to its middle."""
         with cls.in_view():
@@ -327,7 +358,7 @@ class Helper:
             opened = picking.opened_now(bpy.context)
             view = picking.view_on(bpy.context, opened.mesh_object, opened.surface)
         core = import_module(f"{CORE}.geometry.curve")
-        line = opened.polyline()[core.points_of_leg(opened.curve, leg)]
+        line = opened.lines()[0][core.points_of_leg(opened.curve, leg)]
         seen = np.flatnonzero(view.visible(line))
         return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
