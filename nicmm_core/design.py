@@ -30,6 +30,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import check_iterations, checked_corners, checked_options
+from .avoidance.avoided_curve import Avoided, avoided_curves
+from .avoidance.contacts import is_too_close, meeting_only_at_junctions, meets
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, CurveError, UnreachableError
@@ -52,13 +54,6 @@ from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, wa
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
-from .repair.off_curves import (
-    Avoided,
-    avoided_curves,
-    is_too_close,
-    meeting_only_at_junctions,
-    meets,
-)
 from .repaired_surface import (
     Manifold,
     RepairedSurface,

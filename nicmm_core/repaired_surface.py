@@ -20,6 +20,8 @@ from itertools import product
 
 import numpy as np
 
+from .avoidance.avoided_curve import Avoided
+from .avoidance.off_curves import check_off_curves, surface_off_curves
 from .design_result import Design
 from .displaced_start import displaced
 from .errors import CurveError
@@ -33,7 +35,6 @@ from .path.via_points import with_via_points
 from .repair.clean_surface import CleanSurface
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
-from .repair.off_curves import Avoided, check_off_curves, surface_off_curves
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner

@@ -1,0 +1,141 @@
+"""Narrow strips along avoided curves, which are removed from the surface.
+
+Faces are cut along the curve, and a strip, narrow relative to the edges there, is taken off. Strips
+run along the parts of the curves from which no clearance is kept.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import CurveError
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.mesh import Mesh, edge_keys, edge_lengths
+from ..outputs.cut import CutMesh, cut_mesh
+from ..progress import checkpoint
+from ..repair.divided_faces import edges_of, with_divided_edges
+from ..repair.face_parts import FaceParts, whole_faces
+from ..repair.mapped_mesh import MappedMesh
+from .avoided_curve import FADE, Avoided, gap_width
+
+STRIP = 0.004
+"""Width of a barrier on either side of the curve, as a fraction of the edges there."""
+
+DEVIATION = 1e-3
+"""Greatest distance of a barrier from the curve, in mean edge lengths."""
+
+STRIP_OF_CLEARANCE = 0.1
+"""Greatest such width, in clearances."""
+
+
+def barriers_of(mapped: MappedMesh, avoided: Avoided, clearance: float) -> list[SurfaceCurve]:
+    """The parts of a curve on the mesh along which a strip is removed, without their gaps.
+
+    With a clearance, these are the parts near junctions from which it is not kept.
+    """
+    given, junctions = mapped.original, avoided.junctions
+    if clearance > 0.0 and not len(junctions):
+        return []
+    gap = np.array([gap_width(given, avoided, arc, clearance) for arc in junctions])
+    breaks = avoided.ends(gap)
+    if clearance > 0.0:
+        breaks = np.append(breaks, avoided.ends(FADE * clearance))
+    segments, arc = avoided.pieces(given, breaks)
+    used = np.ones(len(arc), dtype=bool)
+    for junction, width in zip(junctions, gap, strict=True):
+        used &= replace(avoided, junctions=np.array([junction])).from_junctions(arc) >= width
+    if clearance > 0.0:
+        used &= avoided.from_junctions(arc) <= FADE * clearance
+    found = []
+    for run, closed in _runs(used, avoided.curve.closed):
+        faces, weights = segments.faces[run], segments.start[run]
+        if not closed:
+            faces = np.append(faces, faces[-1])
+            weights = np.concatenate([weights, segments.end[run[-1:]]])
+        piece = curve_on_mesh(given, closed, faces, weights, np.zeros(0, np.int64))
+        there = mapped.curve_to(piece) if mapped.differs else piece
+        if there is None:
+            raise CurveError(
+                "a curve of avoid enters an obstacle of weight 1 or cannot be mapped at a "
+                "non-manifold edge; leave it out, or lower the weights there"
+            )
+        found.append(there)
+    return found
+
+
+def _runs(used: BoolArray, closed: bool) -> list[tuple[IntArray, bool]]:
+    """Runs of consecutive segments that are used, and whether each of them is a closed curve."""
+    segment = np.arange(len(used))
+    if used.all():
+        return [(segment, closed)]
+    if closed:
+        segment = np.roll(segment, -int((~used).argmax()))
+    runs = np.split(segment, np.flatnonzero(~used[segment]))
+    runs = [run[used[run]] for run in runs]
+    return [(run, False) for run in runs if len(run)]
+
+
+def without_strips(
+    mesh: Mesh, barriers: list[SurfaceCurve], clearance: float
+) -> tuple[FaceParts, FloatArray]:
+    """The faces without a narrow strip along each of some curves, and the vertices of the parts."""
+    parts, cut, chain = whole_faces(mesh.faces), mesh, np.zeros((0, 2), dtype=np.int64)
+    for barrier in barriers:
+        checkpoint()
+        points, _ = parts.through(mesh, barrier)
+        mapped = curve_on_mesh(
+            cut, barrier.closed, points.faces, points.barycentric, barrier.control_index
+        )
+        result = cut_mesh(cut, mapped, deviation=DEVIATION * mesh.mean_edge_length)
+        chain = np.concatenate([_with_new_points(cut, result, chain), result.chain_edges])
+        corners = result.corner_weights(cut) @ parts.corners[result.source_face]
+        parts = FaceParts(result.faces, parts.parent[result.source_face], corners)
+        cut = result.mesh
+    vertices = cut.vertices
+    size = len(vertices)
+    on_chain = np.zeros(size, dtype=bool)
+    on_chain[chain] = True
+    near = on_chain[parts.faces].sum(axis=1) >= 2
+    sides = edges_of(parts.faces[near], size)
+    both = sides[on_chain[sides].all(axis=1)]
+    both = both[
+        ~np.isin(edge_keys(both[:, 0], both[:, 1], size), edge_keys(chain[:, 0], chain[:, 1], size))
+    ]
+    middle = size + np.arange(len(both))
+    parts, vertices = with_divided_edges(parts, vertices, both, middle, np.full(len(both), 0.5))
+    on_chain = np.append(on_chain, np.zeros(len(both), dtype=bool))
+
+    touched = on_chain[parts.faces].any(axis=1)
+    sides = edges_of(parts.faces[touched], len(vertices))
+    ends = sides[on_chain[sides].sum(axis=1) == 1]
+    ends = np.where(on_chain[ends[:, :1]], ends, ends[:, ::-1])
+    share = np.full(len(ends), STRIP)
+    if clearance > 0.0:
+        share = np.minimum(share, STRIP_OF_CLEARANCE * clearance / edge_lengths(vertices, ends))
+    middle = len(vertices) + np.arange(len(ends))
+    parts, vertices = with_divided_edges(parts, vertices, ends, middle, share)
+    on_chain = np.append(on_chain, np.zeros(len(ends), dtype=bool))
+    return parts.taken(~on_chain[parts.faces].any(axis=1)), vertices
+
+
+def _with_new_points(mesh: Mesh, cut: CutMesh, chain: IntArray) -> IntArray:
+    """Edges of earlier cuts, (e, 2), divided at the vertices that a cut has inserted on them."""
+    corners, weights = mesh.faces[cut.new_face], cut.new_barycentric
+    on_edge = np.flatnonzero((weights > 0.0).sum(axis=1) == 2)
+    along: dict[tuple[int, int], list[tuple[float, int]]] = defaultdict(list)
+    for number in on_edge.tolist():
+        (a, s), (b, t) = sorted(
+            (int(v), float(w))
+            for v, w in zip(corners[number], weights[number], strict=True)
+            if w > 0.0
+        )
+        along[a, b].append((t / (s + t), len(mesh.vertices) + number))
+    edges: list[tuple[int, int]] = []
+    for a, b in np.sort(chain, axis=1).tolist():
+        stops = [a, *(vertex for _, vertex in sorted(along.get((a, b), []))), b]
+        edges += zip(stops[:-1], stops[1:], strict=True)
+    return np.array(edges, dtype=np.int64).reshape(-1, 2)
