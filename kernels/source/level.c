@@ -19,8 +19,8 @@
 #define MOST_ROUNDS 32 /* number of rounds in which nodes that cannot be retraced are put back */
 #define PAIRS 256      /* number of crossings that are found at a time */
 
-#define ROUGHNESS 1e-3 /* amount by which the energy may then be above the least one for a curve that
-                          has converged, relative to the energy without a map; that of a nearly
+#define ROUGHNESS 1e-3 /* amount by which the energy of a curve that has converged may then be above
+                          the least one, relative to the energy without a map; that of a nearly
                           straight curve changes so much with the places of its nodes */
 
 enum { GOES_ON = 0, CONVERGED = 1, LIMITED = 2, STALLED = 3, LOST = 4 };
