@@ -41,8 +41,8 @@ class FaceSegments:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def taken(self, which: BoolArray) -> FaceSegments:
-        """Some of the segments."""
+    def taken(self, which: BoolArray | IntArray) -> FaceSegments:
+        """Some of the segments, by indices or a mask."""
         return FaceSegments(self.faces[which], self.start[which], self.end[which])
 
     def positions(self, mesh: Mesh) -> tuple[FloatArray, FloatArray]:

@@ -6,6 +6,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.curve import checked_curve, weights_in_faces
 from nicmm_core.geometry.distances import distance_to_segments
 from nicmm_core.geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
 from tests.core.checks import random_surface_points
@@ -42,6 +43,69 @@ def test_distances_in_a_plane_are_those_of_the_plane(flat_disc):
     assert 50 < near.sum() < 200
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-12, atol=1e-14)
     assert (found[~near] >= 0.5).all()
+
+
+def segments_of(mesh, curve):
+    """The segments of a curve, in order."""
+    curve, faces = checked_curve(mesh, curve)
+    first = np.arange(len(faces) if curve.closed else len(faces) - 1)
+    ends = (
+        weights_in_faces(mesh, curve.faces[index], curve.barycentric[index], faces[first])
+        for index in (first, (first + 1) % len(faces))
+    )
+    return FaceSegments(faces[first], *ends)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("turned", [False, True])
+def test_distances_from_a_bent_polyline_in_a_plane(flat_disc, closed, turned):
+    """Lines of neighbouring segments are divided at the bisectors of their bends, with no gap."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    radius = 0.2 + 0.15 * np.cos(3.0 * angle)
+    corners = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
+    curve = nicmm.design_curve(flat_disc, corners, closed=closed, corners=range(8)).curves[0]
+    segments = segments_of(flat_disc, curve)
+    points = random_surface_points(flat_disc, 200, seed=5)
+    mesh = flat_disc
+    if turned:
+        faces = mesh.faces.copy()
+        which = np.random.default_rng(1).random(len(faces)) < 0.5
+        faces[which] = faces[which][:, [0, 2, 1]]
+        mesh = nicmm.Mesh(mesh.vertices, faces)
+        for weights, of in (
+            (segments.start, segments.faces),
+            (segments.end, segments.faces),
+            (points.barycentric, points.faces),
+        ):
+            weights[which[of]] = weights[which[of]][:, [0, 2, 1]]
+    found = SegmentDistances(mesh, segments, 0.4).at(points)
+    start, end = segments.positions(mesh)
+    places = points.positions(mesh)
+    expected = np.min(
+        [
+            distance_to_segments(places, *np.broadcast_arrays(a, b, places)[:2])
+            for a, b in zip(start, end, strict=True)
+        ],
+        axis=0,
+    )
+    near = expected < 0.4
+    assert 60 < near.sum()
+    np.testing.assert_allclose(found[near], expected[near], rtol=1e-9, atol=1e-12)
+
+
+def test_neighbouring_segments_save_work(flat_disc):
+    """In any other order, all lines beyond the ends of each segment are followed."""
+    curve = nicmm.design_curve(flat_disc, [3, 40, 90], closed=True).curves[0]
+    segments = segments_of(flat_disc, curve)
+    shuffled = np.random.default_rng(0).permutation(len(segments))
+    in_order, mixed = (
+        SegmentDistances(flat_disc, segments.taken(which), 0.3)
+        for which in (np.arange(len(segments)), shuffled)
+    )
+    np.testing.assert_allclose(
+        np.minimum(in_order.at_vertices, 0.3), np.minimum(mixed.at_vertices, 0.3), atol=1e-12
+    )
+    assert 1.5 * len(in_order.paths.sides) < len(mixed.paths.sides)
 
 
 @pytest.mark.parametrize("limit", [0.2, 1.0])
