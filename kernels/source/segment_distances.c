@@ -358,67 +358,66 @@ static int begin_segment(const Mesh *mesh, Propagation *work, int64_t segment)
     return OK;
 }
 
+static Vector in_axes(Vector vector, Vector x_axis)
+{
+    Vector found = {vector.x * x_axis.x + vector.y * x_axis.y,
+                    vector.y * x_axis.x - vector.x * x_axis.y};
+    return found;
+}
+
+/* Adds the part of a side of a face that is seen through a window on another one. The face is to
+   the left of the side, which runs from the line at the high end of the window to that at the low
+   end. */
+static int add_through_window(const Mesh *mesh, Propagation *work, int64_t side,
+                              const Window *window, Vector begin, Vector end)
+{
+    Vector at_low = {window->low, 0.0}, at_high = {window->high, 0.0}, edge = way(begin, end);
+    double length = norm(edge), low = 0.0, high = 1.0;
+    if (!(length > 0.0)) return OK;
+    clip(cross_of(way(at_low, begin), window->at_low), cross_of(way(at_low, end), window->at_low),
+         &low, &high);
+    clip(cross_of(window->at_high, way(at_high, begin)),
+         cross_of(window->at_high, way(at_high, end)), &low, &high);
+    if (!(low < high)) return OK;
+    Vector x_axis = {edge.x / length, edge.y / length};
+    Window next = {.start = in_axes(way(begin, window->start), x_axis),
+                   .end = in_axes(way(begin, window->end), x_axis),
+                   .before = window->before,
+                   .low = low * length,
+                   .high = high * length};
+    Vector first = in_axes(window->at_high, x_axis), last = in_axes(window->at_low, x_axis);
+    next.at_low = low > 0.0 && first.y < 0.0
+                      ? first
+                      : line_through(&next, next.low, first, -1.0, work->scale);
+    next.at_high = high < 1.0 && last.y < 0.0
+                       ? last
+                       : line_through(&next, next.high, last, 1.0, work->scale);
+    return add_window(mesh, work, side, &next, length);
+}
+
 /* Adds the windows on the other two sides of the face that a window leads into. */
 static int cross_face(const Mesh *mesh, Propagation *work, int64_t side, Window window)
 {
     Plane plane;
     TRY(plane_of(mesh, side, &plane));
-    int64_t own = side % 3, face_start = side - own;
-    Vector apex = plane.apex, corners[3] = {apex, {0.0, 0.0}, {plane.length, 0.0}};
+    int64_t own = side % 3, face_start = side - own, vertex;
+    Vector apex = plane.apex, first = {0.0, 0.0}, second = {plane.length, 0.0};
     double seen = distance_if_seen(&window, apex, work->scale);
-    int skipped = 0;
+    int to_second = 1, to_first = 1;
     if (seen < INFINITY) {
-        int64_t vertex;
         TRY(lower_apex(mesh, work, side, apex, window.start, window.end, window.before));
         TRY(vertex_at(mesh, side, &vertex));
         /* Shortest paths do not cross: beside a shorter one to the apex, lines continue only on
            their own side of it, as by Chen and Han ("Shortest paths on a polyhedron", 1990). */
         Vector path = way(apex, nearest_on(window.start, window.end, apex));
-        Vector first = {-apex.x, -apex.y};
-        if (seen > work->distances[vertex] + work->scale && work->corners[vertex] == side)
-            skipped = angle_between(first, path) < work->arrivals[vertex] ? 1 : 2;
-    }
-    Vector at_low = {window.low, 0.0}, at_high = {window.high, 0.0};
-    /* Sides from the second end to the apex, and from the apex to the first end. */
-    for (int k = 1; k < 3; k++) {
-        if (k == skipped) continue;
-        Vector begin = corners[k == 1 ? 2 : 0], end = corners[k == 1 ? 0 : 1];
-        Vector edge = way(begin, end);
-        double length = norm(edge), values[2][2], low = 0.0, high = 1.0;
-        if (!(length > 0.0)) continue;
-        for (int i = 0; i < 2; i++) {
-            Vector corner = i ? end : begin;
-            values[0][i] = cross_of(way(at_low, corner), window.at_low);
-            values[1][i] = cross_of(window.at_high, way(at_high, corner));
+        if (seen > work->distances[vertex] + work->scale && work->corners[vertex] == side) {
+            to_first = angle_between(way(apex, first), path) < work->arrivals[vertex];
+            to_second = !to_first;
         }
-        for (int j = 0; j < 2; j++) clip(values[j][0], values[j][1], &low, &high);
-        if (!(low < high)) continue;
-        Vector x_axis = {edge.x / length, edge.y / length};
-        Vector y_axis = {-x_axis.y, x_axis.x}; /* the face is to the left of the side */
-        Vector from[2] = {way(begin, window.start), way(begin, window.end)};
-        Window next = {
-            {from[0].x * x_axis.x + from[0].y * x_axis.y,
-             from[0].x * y_axis.x + from[0].y * y_axis.y},
-            {from[1].x * x_axis.x + from[1].y * x_axis.y,
-             from[1].x * y_axis.x + from[1].y * y_axis.y},
-            window.before, low * length, high * length, {0.0, 0.0}, {0.0, 0.0},
-        };
-        /* Seen from inside the face, the side runs from the line at `high` to that at `low`. */
-        Vector lines[2] = {window.at_high, window.at_low};
-        for (int i = 0; i < 2; i++) {
-            Vector line = {lines[i].x * x_axis.x + lines[i].y * x_axis.y,
-                           lines[i].x * y_axis.x + lines[i].y * y_axis.y};
-            int is_clipped = i ? high < 1.0 : low > 0.0;
-            double at = i ? next.high : next.low, outward = i ? 1.0 : -1.0;
-            Vector through = line_through(&next, at, line, outward, work->scale);
-            if (is_clipped && line.y < 0.0) through = line;
-            if (i)
-                next.at_high = through;
-            else
-                next.at_low = through;
-        }
-        TRY(add_window(mesh, work, face_start + (own + k) % 3, &next, length));
     }
+    int64_t sides[2] = {face_start + (own + 1) % 3, face_start + (own + 2) % 3};
+    if (to_second) TRY(add_through_window(mesh, work, sides[0], &window, second, apex));
+    if (to_first) TRY(add_through_window(mesh, work, sides[1], &window, apex, first));
     return OK;
 }
 
