@@ -12,6 +12,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.__main__ import main
 from nicmm_core.geometry.distances import distance_to_segments
+from nicmm_core.geometry.surface_points import nearest_points
 from nicmm_core.io.files import read_curve, write_curve, write_mesh
 from tests.core.checks import assert_valid_design
 from tests.oracles.checker import judge
@@ -120,6 +121,31 @@ def test_distance_on_a_torus():
     assert_valid_design(mesh, design, mesh.vertices[points])
     distance = least_distance(mesh, design.curves[0], first.curves[0], clearance / 8)
     assert distance >= LEAST * clearance
+
+
+@pytest.mark.slow
+def test_two_curves_on_a_torus_keep_their_distance_and_no_more():
+    """The distance from the outer equator is that along a meridian, r |v|."""
+    mesh, tube = shapes.torus(around=128, across=64), 0.4
+
+    def on_torus(degrees, across):
+        u, radius = np.radians(degrees), 1.0 + tube * np.cos(across)
+        places = np.stack([radius * np.cos(u), radius * np.sin(u), tube * np.sin(across)], axis=1)
+        return nearest_points(mesh, places)[0]
+
+    def least_distance_from_equator(curve):
+        x, y, z = curve.points.T
+        return (tube * np.arctan2(z, np.hypot(x, y) - 1.0)).min()
+
+    first = nicmm.design_curve(mesh, on_torus(np.arange(0.0, 360.0, 30.0), np.zeros(12)))
+    assert np.abs(first.curves[0].points[:, 2]).max() < 1e-4
+    points = on_torus(np.array([-40.0, -12.0, 12.0, 40.0]), np.array([0.6, 0.17, 0.17, 0.6]))
+    free = nicmm.design_curve(mesh, points, closed=False)
+    assert least_distance_from_equator(free.curves[0]) < 0.9 * CLEARANCE
+    design = nicmm.design_curve(mesh, points, closed=False, avoid=[first], clearance=CLEARANCE)
+    assert_valid_design(mesh, design, points.positions(mesh), closed=False)
+    distance = least_distance_from_equator(design.curves[0])
+    assert LEAST * CLEARANCE <= distance <= MOST * CLEARANCE
 
 
 def test_distance_from_a_great_circle():
