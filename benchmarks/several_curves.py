@@ -11,9 +11,8 @@ from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
-from nicmm_core.geometry.curve import checked_curve, weights_in_faces
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.geometry.segment_distances import FaceSegments, SegmentDistances
+from nicmm_core.geometry.segment_distances import SegmentDistances, segments_of
 from nicmm_core.geometry.surface_points import SurfacePoints
 from tests.oracles.checker import judge
 from tests.oracles.curve_pairs import contacts
@@ -197,14 +196,7 @@ def _distance(
     mesh: Mesh, curve: nicmm.SurfaceCurve, other: nicmm.SurfaceCurve, clearance: float
 ) -> float:
     """Least distance of the points of a curve from another one; infinite if it is large."""
-    other, faces = checked_curve(mesh, other)
-    first = np.arange(len(other.faces) if other.closed else len(other.faces) - 1)
-    faces = faces[first]
-    ends = [
-        weights_in_faces(mesh, other.faces[index], other.barycentric[index], faces)
-        for index in (first, (first + 1) % len(other.faces))
-    ]
-    distances = SegmentDistances(mesh, FaceSegments(faces, *ends), 1.5 * clearance)
+    distances = SegmentDistances(mesh, segments_of(mesh, other), 1.5 * clearance)
     found: FloatArray = distances.at(SurfacePoints(curve.faces, curve.barycentric))
     least = float(found.min())
     return least if least < 1.5 * clearance else np.inf

@@ -14,8 +14,9 @@ from scipy.spatial.distance import cdist
 from ..errors import UnreachableError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_places
-from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
+from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
+from ..geometry.segment_distances import segments_of
 from ..geometry.surface_points import SurfacePoints
 from ..repair.mapped_mesh import MappedMesh
 from .avoided_curve import Avoided, gap_width
@@ -92,17 +93,11 @@ def is_too_close(
     segments = segments_with_clearance(mapped, avoided, clearance)
     if not len(segments):
         return False
-    curve, faces = checked_curve(mapped.mesh, curve, across_gaps=True)
-    faces = faces if curve.closed else faces[:-1]
-    index = np.arange(len(faces))
-    start, end = (
-        weights_in_faces(mapped.mesh, curve.faces[ends], curve.barycentric[ends], faces)
-        for ends in (index, (index + 1) % len(curve.faces))
-    )
+    pieces = segments_of(mapped.mesh, curve)
     distances = distances_near(mapped.mesh, segments, clearance)
     return any(
-        bool((distances.at(SurfacePoints(faces, weights)) < clearance).any())
-        for weights in (start, 0.5 * (start + end), end)
+        bool((distances.at(SurfacePoints(pieces.faces, weights)) < clearance).any())
+        for weights in (pieces.start, 0.5 * (pieces.start + pieces.end), pieces.end)
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
+from .curve import SurfaceCurve, checked_curve, weights_in_faces
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
@@ -49,6 +50,24 @@ class FaceSegments:
         """Positions of both ends, (s, 3)."""
         start, end = (SurfacePoints(self.faces, ends) for ends in (self.start, self.end))
         return start.positions(mesh), end.positions(mesh)
+
+
+def segments_of(mesh: Mesh, curve: SurfaceCurve) -> FaceSegments:
+    """The segments of a curve, in order.
+
+    Raises
+    ------
+    CurveError
+        If it does not lie on the mesh.
+    """
+    curve, faces = checked_curve(mesh, curve, across_gaps=True)
+    first = np.arange(len(faces) if curve.closed else len(faces) - 1)
+    faces = faces[first]
+    start, end = (
+        weights_in_faces(mesh, curve.faces[ends], curve.barycentric[ends], faces)
+        for ends in (first, (first + 1) % len(curve.faces))
+    )
+    return FaceSegments(faces, start, end)
 
 
 def joined_segments(parts: Sequence[FaceSegments]) -> FaceSegments:

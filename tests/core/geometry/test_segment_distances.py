@@ -6,9 +6,13 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.geometry.curve import checked_curve, weights_in_faces
 from nicmm_core.geometry.distances import distance_to_segments
-from nicmm_core.geometry.segment_distances import FaceSegments, SegmentDistances, joined_segments
+from nicmm_core.geometry.segment_distances import (
+    FaceSegments,
+    SegmentDistances,
+    joined_segments,
+    segments_of,
+)
 from tests.core.checks import random_surface_points
 
 
@@ -26,34 +30,28 @@ def at_vertices(mesh, vertices):
     return FaceSegments(faces, weights, weights)
 
 
-def test_distances_in_a_plane_are_those_of_the_plane(flat_disc):
-    segments = inside_faces(flat_disc, 5, seed=2)
-    points = random_surface_points(flat_disc, 200, seed=5)
-    found = SegmentDistances(flat_disc, segments, 0.5).at(points)
-    start, end = segments.positions(flat_disc)
-    places = points.positions(flat_disc)
-    expected = np.min(
+def distances_in_space(mesh, segments, points):
+    """Least distance of each point from straight segments."""
+    start, end = segments.positions(mesh)
+    places = points.positions(mesh)
+    return np.min(
         [
             distance_to_segments(places, *np.broadcast_arrays(a, b, places)[:2])
             for a, b in zip(start, end, strict=True)
         ],
         axis=0,
     )
+
+
+def test_distances_in_a_plane_are_those_of_the_plane(flat_disc):
+    segments = inside_faces(flat_disc, 5, seed=2)
+    points = random_surface_points(flat_disc, 200, seed=5)
+    found = SegmentDistances(flat_disc, segments, 0.5).at(points)
+    expected = distances_in_space(flat_disc, segments, points)
     near = expected < 0.5
     assert 50 < near.sum() < 200
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-12, atol=1e-14)
     assert (found[~near] >= 0.5).all()
-
-
-def segments_of(mesh, curve):
-    """The segments of a curve, in order."""
-    curve, faces = checked_curve(mesh, curve)
-    first = np.arange(len(faces) if curve.closed else len(faces) - 1)
-    ends = (
-        weights_in_faces(mesh, curve.faces[index], curve.barycentric[index], faces[first])
-        for index in (first, (first + 1) % len(faces))
-    )
-    return FaceSegments(faces[first], *ends)
 
 
 @pytest.mark.parametrize("closed", [True, False])
@@ -79,15 +77,7 @@ def test_distances_from_a_bent_polyline_in_a_plane(flat_disc, closed, turned):
         ):
             weights[which[of]] = weights[which[of]][:, [0, 2, 1]]
     found = SegmentDistances(mesh, segments, 0.4).at(points)
-    start, end = segments.positions(mesh)
-    places = points.positions(mesh)
-    expected = np.min(
-        [
-            distance_to_segments(places, *np.broadcast_arrays(a, b, places)[:2])
-            for a, b in zip(start, end, strict=True)
-        ],
-        axis=0,
-    )
+    expected = distances_in_space(mesh, segments, points)
     near = expected < 0.4
     assert 60 < near.sum()
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-9, atol=1e-12)
