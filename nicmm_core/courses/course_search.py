@@ -173,19 +173,9 @@ def find_courses(
         nodes, visit, doublings = _resolved(
             surface, nodes, visit, smoothness, search_size.finalists
         )
-    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    combined = recombined(surface, nodes, visit, simple, smoothness, search_size.recombined)
-    if combined is not None:
-        new, new_visit = combined
-        new = _with_corners(new, new_visit, corners)
-        new, new_visit, _ = remove_crossings(surface, new, new_visit, any_order)
-        with subrange(0.6, 0.7):
-            new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
-        new, new_visit, new_simple = remove_crossings(surface, new, new_visit, any_order)
-        places = joined([nodes.places, new.places])
-        nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
-        visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
-        nodes = _with_corners(nodes, visit, corners)
+    nodes, visit, simple = _with_recombined(
+        surface, nodes, visit, corners, smoothness, any_order, search_size.recombined
+    )
     best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search_size.finalists]
     nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
@@ -197,6 +187,35 @@ def find_courses(
         for _ in range(2):
             yield own, visited
             own, visited = _resampled(surface, own, visited, 2)
+
+
+def _with_recombined(
+    surface: CurveSurface,
+    nodes: Nodes,
+    visit: IntArray,
+    corners: BoolArray,
+    smoothness: float,
+    any_order: bool,
+    most: int,
+) -> tuple[Nodes, IntArray, BoolArray]:
+    """Courses without crossings, and new ones of their legs.
+
+    Also the control point at each node, and which courses are simple.
+    """
+    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
+    combined = recombined(surface, nodes, visit, simple, smoothness, most)
+    if combined is None:
+        return nodes, visit, simple
+    new, new_visit = combined
+    new = _with_corners(new, new_visit, corners)
+    new, new_visit, _ = remove_crossings(surface, new, new_visit, any_order)
+    with subrange(0.6, 0.7):
+        new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
+    new, new_visit, new_simple = remove_crossings(surface, new, new_visit, any_order)
+    places = joined([nodes.places, new.places])
+    nodes = nodes_at(surface, places, nodes.closed, nodes.curves + new.curves)
+    visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
+    return _with_corners(nodes, visit, corners), visit, simple
 
 
 def _with_corners(nodes: Nodes, visit: IntArray, corners: BoolArray) -> Nodes:
