@@ -165,15 +165,27 @@ static int least_distance(const Mesh *mesh, const Propagation *work, int64_t sid
     return OK;
 }
 
-/* Whether a segment lies in the line of an edge, beside the window on it. Its straight paths run along
-   the edge and continue at the vertices; none leads through the window. Rounding bends the line at
-   the vertices, and without this test such paths would turn around them. */
+/* Whether a segment lies in the line of an edge, beside the window on it. Its straight paths run
+   along the edge and continue at the vertices; none leads through the window. Rounding bends the
+   line at the vertices, and without this test such paths would turn around them. */
 static int is_grazed(const Window *window, double scale)
 {
     double left = lesser(window->start.x, window->end.x);
     double right = greater(window->start.x, window->end.x);
     return lesser(window->start.y, window->end.y) >= -scale &&
            (left > window->high + scale || right < window->low - scale);
+}
+
+/* The part of a segment with y >= 0. From the rest, no line leads through an edge on the x axis. */
+static void clip_behind(Vector start, Vector end, Vector *first, Vector *last)
+{
+    double rise = end.y - start.y;
+    *first = start;
+    *last = end;
+    if (start.y < 0.0 && end.y > 0.0) first->x -= start.y * (end.x - start.x) / rise;
+    if (end.y < 0.0 && start.y > 0.0) last->x -= end.y * (end.x - start.x) / rise;
+    first->y = greater(start.y, 0.0);
+    last->y = greater(end.y, 0.0);
 }
 
 /* Adds a window on a side of a face, given in the plane of this face, which has y > 0. Nothing is
@@ -188,9 +200,11 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
     TRY(ends_of(mesh, beyond, &first_beyond, &second));
     int is_turned = first != first_beyond;
     double sign = is_turned ? -1.0 : 1.0, shift = is_turned ? length : 0.0;
+    Vector start, end;
+    clip_behind(given->start, given->end, &start, &end);
     Window window = {
-        {shift + sign * given->start.x, lesser(-given->start.y, 0.0)},
-        {shift + sign * given->end.x, lesser(-given->end.y, 0.0)},
+        {shift + sign * start.x, -start.y},
+        {shift + sign * end.x, -end.y},
         given->before,
         greater(is_turned ? length - given->high : given->low, 0.0),
         lesser(is_turned ? length - given->low : given->high, length),
@@ -412,25 +426,13 @@ static int cross_face(const Mesh *mesh, Propagation *work, int64_t side, Window 
 {
     Plane plane;
     TRY(plane_of(mesh, side, &plane));
-    int64_t own = side % 3, face_start = side - own, vertex;
+    int64_t own = side % 3, face_start = side - own;
     Vector apex = plane.apex, first = {0.0, 0.0}, second = {plane.length, 0.0};
-    double seen = distance_if_seen(&window, apex, work->scale);
-    int to_second = 1, to_first = 1;
-    if (seen < INFINITY) {
+    if (distance_if_seen(&window, apex, work->scale) < INFINITY)
         TRY(lower_apex(mesh, work, side, apex, window.start, window.end, window.before));
-        TRY(vertex_at(mesh, side, &vertex));
-        /* Shortest paths do not cross: beside a shorter one to the apex, lines continue only on
-           their own side of it, as by Chen and Han ("Shortest paths on a polyhedron", 1990). */
-        Vector path = way(apex, nearest_on(window.start, window.end, apex));
-        if (seen > work->distances[vertex] + work->scale && work->corners[vertex] == side) {
-            to_first = angle_between(way(apex, first), path) < work->arrivals[vertex];
-            to_second = !to_first;
-        }
-    }
     int64_t sides[2] = {face_start + (own + 1) % 3, face_start + (own + 2) % 3};
-    if (to_second) TRY(add_through_window(mesh, work, sides[0], &window, second, apex));
-    if (to_first) TRY(add_through_window(mesh, work, sides[1], &window, apex, first));
-    return OK;
+    TRY(add_through_window(mesh, work, sides[0], &window, second, apex));
+    return add_through_window(mesh, work, sides[1], &window, apex, first);
 }
 
 /* A corner at the same vertex in the face beyond one of the two sides there, or -1 at a boundary.

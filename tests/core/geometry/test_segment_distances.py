@@ -83,6 +83,36 @@ def test_distances_from_a_bent_polyline_in_a_plane(flat_disc, closed, turned):
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-9, atol=1e-12)
 
 
+def test_distances_from_a_segment_are_the_least_of_those_of_its_points():
+    """Also where paths unfold so that the segment crosses the line of an edge."""
+    mesh = shapes.creature(2, resolution=32, faces=400)
+    segments, limit = inside_faces(mesh, 12, seed=4), 0.3
+    share = np.linspace(0.0, 1.0, 301)[:, None]
+    for index in range(len(segments)):
+        one = segments.taken(np.array([index]))
+        points = (1.0 - share) * one.start + share * one.end
+        dense = FaceSegments(np.full(len(share), one.faces[0]), points, points)
+        found = SegmentDistances(mesh, one, limit).at_vertices
+        expected = SegmentDistances(mesh, dense, limit).at_vertices
+        near = expected < 0.99 * limit
+        assert near.sum() > 5
+        assert (found[near] <= expected[near] * (1.0 + 1e-9)).all()
+        np.testing.assert_allclose(found[near], expected[near], atol=1e-4)
+
+
+def test_the_order_of_segments_does_not_matter():
+    mesh = shapes.creature(2, resolution=32, faces=400)
+    segments = segments_of(mesh, nicmm.design_curve(mesh, [5, 90, 170]).curves[0])
+    shuffled = np.random.default_rng(0).permutation(len(segments))
+    limit = 0.3
+    one, other = (
+        SegmentDistances(mesh, each, limit).at_vertices
+        for each in (segments, segments.taken(shuffled))
+    )
+    near = np.minimum(one, other) < limit
+    np.testing.assert_allclose(one[near], other[near], rtol=1e-9)
+
+
 def test_neighbouring_segments_save_work(flat_disc):
     """In any other order, all lines beyond the ends of each segment are followed."""
     curve = nicmm.design_curve(flat_disc, [3, 40, 90], closed=True).curves[0]
