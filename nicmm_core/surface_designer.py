@@ -5,9 +5,11 @@ This is the pipeline of a checked request; `design` is its entry point.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -19,11 +21,20 @@ from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
 from .mapped_surface import MappedSurface
+from .new_legs import Leg, legs_of, may_need_search
 from .progress import CancelledError, checkpoint, subrange
+from .relaxation.curve_energies import energies_of
+from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
 from .request import Request
-from .start import WITHOUT_START, Resumable, moved_start, unsettled_vertices
+from .start import (
+    WITHOUT_START,
+    Resumable,
+    curve_of_start,
+    moved_start,
+    unsettled_vertices,
+)
 from .start_search import InitialCurve, StartSearch
 from .status import Status
 from .symmetry.half_order import in_shortest_order
@@ -45,6 +56,9 @@ LIMIT_TO_USUAL_ITERATIONS = 10
 
 Since most curves converge long before the limit, reported progress rises quickly at first.
 """
+
+TRIED = 2
+"""Greatest number of courses of new legs that are relaxed for a start."""
 
 COLLISIONS = 3
 """Number of designs after a collision for which strands are assumed to collide again."""
@@ -109,33 +123,46 @@ class SurfaceDesigner:
         max_iterations: int | None,
         started: float,
     ) -> Design:
-        """Move a start to the control points and relax it."""
+        """Move a start to the control points and relax it.
+
+        If points have come or gone, courses of the new legs are tried as well.
+        """
         surface = self._search.surface.of(request)
-        curve, visited = moved_start(surface, start, request)
-        collisions, unsettled = 0, None
-        if isinstance(start, Resumable):
-            collisions, unsettled = start.collisions, unsettled_vertices(start, request, visited)
-        # If strands collide, an attempt without tracing every iteration would fail.
-        config = replace(WARM, defer_tracing=not collisions)
-        begin = InitialCurve(
-            curve,
-            visited,
-            surface,
-            self._search.surface.unit,
-            collisions=collisions,
-            unsettled=unsettled,
-        )
-        if request.mirror is None:
-            relaxed = _relaxed(request, begin, config, max_iterations)
-            return self._relaxed_design(request, begin, relaxed, started)
-        if max_iterations is not None:
-            config = replace(config, most_iterations=max_iterations)
-        found = relaxed_symmetric(
-            request, begin, None, curve.length, partial(_relaxed_unless_cancelled, request), config
-        )
-        if found is None:
-            raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
-        return self._relaxed_design(request, *found, started)
+        curve, numbers = curve_of_start(surface, start, request)
+        legs: list[Leg] = []
+        if max_iterations is None and len(request.points) != len(curve.control_nodes):
+            legs = legs_of(surface, curve, request)
+            if not may_need_search(surface, curve, legs, request):
+                legs = []
+        found: list[tuple[InitialCurve, Relaxed]] = []
+        problem: CurveError | None = None
+        try:
+            moved, visited = moved_start(surface, curve, numbers, request)
+            begin = InitialCurve(moved, visited, surface, self._search.surface.unit)
+            if isinstance(start, Resumable):
+                unsettled = unsettled_vertices(start, request, visited)
+                begin = replace(begin, collisions=start.collisions, unsettled=unsettled)
+            found.append(_continued(request, begin, max_iterations))
+        except CurveError as error:
+            if not legs:
+                raise
+            problem = error
+        cancelled = bool(found) and found[0][1].status is Status.CANCELLED
+        if legs and not cancelled:
+            try:
+                for begin in islice(self._search.with_new_legs(request, curve, legs), TRIED):
+                    with contextlib.suppress(CurveError):
+                        found.append(_continued(request, begin, None))
+            except CancelledError:
+                if not found:
+                    raise
+                cancelled = True
+        if not found:
+            assert problem is not None
+            raise problem
+        best = _fairest(request, found, problem is None)
+        design = self._relaxed_design(request, *best, started)
+        return replace(design, status=Status.CANCELLED) if cancelled else design
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
@@ -259,6 +286,41 @@ class SurfaceDesigner:
                 np.zeros(0, np.int64) if converged else start.unsettled,
             ),
         )
+
+
+def _continued(
+    request: Request, begin: InitialCurve, max_iterations: int | None
+) -> tuple[InitialCurve, Relaxed]:
+    """Relax a start that has been fitted to the control points.
+
+    Raises
+    ------
+    CurveError
+        If a symmetric curve is requested and the start cannot be made symmetric.
+    """
+    # If strands collide, an attempt without tracing every iteration would fail.
+    config = replace(WARM, defer_tracing=not begin.collisions)
+    if request.mirror is None:
+        return begin, _relaxed(request, begin, config, max_iterations)
+    if max_iterations is not None:
+        config = replace(config, most_iterations=max_iterations)
+    assert isinstance(begin.curve, DiscreteCurve)
+    relax = partial(_relaxed_unless_cancelled, request)
+    found = relaxed_symmetric(request, begin, None, begin.curve.length, relax, config)
+    if found is None:
+        raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
+    return found
+
+
+def _fairest(
+    request: Request, found: list[tuple[InitialCurve, Relaxed]], first_is_moved: bool
+) -> tuple[InitialCurve, Relaxed]:
+    """The curve of least energy."""
+    curves = [relaxed.discrete_curve for _, relaxed in found]
+    energies = energies_of(found[0][0].surface, curves, request.smoothness)
+    import os
+    if os.environ.get("LOGE"): print("   energies", first_is_moved, [round(e,2) for e in energies])
+    return found[energies.index(min(energies))]
 
 
 def _relaxed(
