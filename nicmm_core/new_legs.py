@@ -7,6 +7,7 @@ control points that stay is also searched for anew. All other legs keep their co
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -121,6 +122,36 @@ def may_need_search(
     )
 
 
+def widened(legs: Sequence[Leg], closed: bool) -> list[Leg]:
+    """Legs in which each new one has been joined with its two neighbours.
+
+    An empty list if no leg would stay.
+    """
+    new = np.array([leg.is_new for leg in legs])
+    beside = np.convolve(new, [1, 1, 1], "same") > 0
+    if closed:
+        beside = new | np.roll(new, 1) | np.roll(new, -1)
+    if beside.all():
+        return []
+    begin = int((~beside).argmax()) if closed else 0
+    runs = itertools.groupby(
+        zip(np.roll(beside, -begin), [*legs[begin:], *legs[:begin]], strict=True),
+        key=lambda pair: bool(pair[0]),
+    )
+    result: list[Leg] = []
+    for is_new, pairs in runs:
+        run = [leg for _, leg in pairs]
+        result += [_merged(run)] if is_new else run
+    return result
+
+
+def _merged(legs: list[Leg]) -> Leg:
+    """Consecutive legs as one new leg."""
+    points = np.concatenate([legs[0].points, *(leg.points[1:] for leg in legs[1:])])
+    nodes = np.concatenate([legs[0].nodes, *(leg.nodes[1:] for leg in legs[1:])])
+    return Leg(points, nodes, True)
+
+
 def _nodes_between(curve: DiscreteCurve, place: int, step: int) -> IntArray:
     """The nodes from a control point, given by its place in the order, to one some places later."""
     ends, count = curve.control_nodes, len(curve.nodes.positions)
@@ -167,10 +198,8 @@ def request_for_leg(
     return of_leg, slice(len(before), len(before) + len(leg.points))
 
 
-def _node_beside(
-    curve: DiscreteCurve, legs: Sequence[Leg], number: int, side: int
-) -> IntArray:
-    """A node of the leg before (-1) or after (1) a leg, near to it, if that leg stays, (0 or 1,)."""
+def _node_beside(curve: DiscreteCurve, legs: Sequence[Leg], number: int, side: int) -> IntArray:
+    """A node near a leg on the one before (-1) or after it (1), if that leg stays, (0 or 1,)."""
     beside = number + side
     if not curve.closed and not 0 <= beside < len(legs):
         return np.zeros(0, dtype=np.int64)

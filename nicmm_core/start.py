@@ -312,9 +312,7 @@ def _rotated_to_first(
     return place_nodes(surface, whole, WARM.levels[-1]), np.roll(visited, -first)
 
 
-def unchanged_points(
-    surface: CurveSurface, curve: DiscreteCurve, request: Request
-) -> IntArray:
+def unchanged_points(surface: CurveSurface, curve: DiscreteCurve, request: Request) -> IntArray:
     """For each control point of a request, (k,), its place in the order of a start, or -1.
 
     Raises

@@ -122,6 +122,8 @@ class StartSearch:
     ) -> Iterator[InitialCurve]:
         """A start with courses of its new legs; the best of each leg come first.
 
+        There are none if no leg is new.
+
         Parameters
         ----------
         request : Request

@@ -9,10 +9,10 @@ import contextlib
 import time
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 
 import numpy as np
 
+from .continued import ContinuedCurve, chosen, has_detour
 from .design_result import Design
 from .errors import CurveError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -21,9 +21,8 @@ from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
 from .mapped_surface import MappedSurface
-from .new_legs import Leg, legs_of, may_need_search
+from .new_legs import Leg, legs_of, may_need_search, widened
 from .progress import CancelledError, checkpoint, subrange
-from .relaxation.curve_energies import energies_of
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
@@ -35,7 +34,7 @@ from .start import (
     moved_start,
     unsettled_vertices,
 )
-from .start_search import InitialCurve, StartSearch
+from .start_search import InitialCurve, StartSearch, is_new
 from .status import Status
 from .symmetry.half_order import in_shortest_order
 from .symmetry.half_search import NO_SYMMETRIC_CURVE, symmetric_by_halves
@@ -134,8 +133,7 @@ class SurfaceDesigner:
             legs = legs_of(surface, curve, request)
             if not may_need_search(surface, curve, legs, request):
                 legs = []
-        found: list[tuple[InitialCurve, Relaxed]] = []
-        problem: CurveError | None = None
+        found, problem = [], None
         try:
             moved, visited = moved_start(surface, curve, numbers, request)
             begin = InitialCurve(moved, visited, surface, self._search.surface.unit)
@@ -147,22 +145,58 @@ class SurfaceDesigner:
             if not legs:
                 raise
             problem = error
-        cancelled = bool(found) and found[0][1].status is Status.CANCELLED
-        if legs and not cancelled:
-            try:
-                for begin in islice(self._search.with_new_legs(request, curve, legs), TRIED):
-                    with contextlib.suppress(CurveError):
-                        found.append(_continued(request, begin, None))
-            except CancelledError:
-                if not found:
-                    raise
-                cancelled = True
-        if not found:
-            assert problem is not None
-            raise problem
-        best = _fairest(request, found, problem is None)
-        design = self._relaxed_design(request, *best, started)
+        cancelled = False
+        if legs and not (found and found[0].relaxed.status is Status.CANCELLED):
+            cancelled = self._try_new_legs(request, curve, legs, found)
+            if problem is not None and not found:
+                raise problem
+        best = chosen(request, curve, found) if legs else found[0]
+        design = self._relaxed_design(request, best.start, best.relaxed, started)
         return replace(design, status=Status.CANCELLED) if cancelled else design
+
+    def _try_new_legs(
+        self,
+        request: Request,
+        curve: DiscreteCurve,
+        legs: list[Leg],
+        found: list[ContinuedCurve],
+    ) -> bool:
+        """Append curves with other courses of the new legs of a start.
+
+        If all curves bend far more than the start, the neighbouring legs are searched for as well.
+        Returns whether the caller has stopped it after a first curve.
+        """
+        try:
+            self._try_legs(request, curve, legs, found, 1)
+            if has_detour(curve, found):
+                self._try_legs(request, curve, widened(legs, curve.closed), found, 2)
+        except CancelledError:
+            if not found:
+                raise
+            return True
+        return False
+
+    def _try_legs(
+        self,
+        request: Request,
+        curve: DiscreteCurve,
+        legs: list[Leg],
+        found: list[ContinuedCurve],
+        given_up: int,
+    ) -> None:
+        """Append curves with courses of some legs of a start."""
+        tried: list[DiscreteCurve] = []
+        for begin in self._search.with_new_legs(request, curve, legs):
+            if not is_new(begin, tried):
+                continue
+            assert isinstance(begin.curve, DiscreteCurve)
+            tried.append(begin.curve)
+            with contextlib.suppress(CurveError):  # there may be no symmetric curve
+                found.append(_continued(request, begin, None, given_up))
+            if found and found[-1].relaxed.status is Status.CANCELLED:
+                raise CancelledError
+            if len(tried) == TRIED:
+                break
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
@@ -289,8 +323,8 @@ class SurfaceDesigner:
 
 
 def _continued(
-    request: Request, begin: InitialCurve, max_iterations: int | None
-) -> tuple[InitialCurve, Relaxed]:
+    request: Request, begin: InitialCurve, max_iterations: int | None, given_up: int = 0
+) -> ContinuedCurve:
     """Relax a start that has been fitted to the control points.
 
     Raises
@@ -301,7 +335,8 @@ def _continued(
     # If strands collide, an attempt without tracing every iteration would fail.
     config = replace(WARM, defer_tracing=not begin.collisions)
     if request.mirror is None:
-        return begin, _relaxed(request, begin, config, max_iterations)
+        relaxed = _relaxed(request, begin, config, max_iterations)
+        return ContinuedCurve(begin, relaxed, given_up)
     if max_iterations is not None:
         config = replace(config, most_iterations=max_iterations)
     assert isinstance(begin.curve, DiscreteCurve)
@@ -309,18 +344,7 @@ def _continued(
     found = relaxed_symmetric(request, begin, None, begin.curve.length, relax, config)
     if found is None:
         raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
-    return found
-
-
-def _fairest(
-    request: Request, found: list[tuple[InitialCurve, Relaxed]], first_is_moved: bool
-) -> tuple[InitialCurve, Relaxed]:
-    """The curve of least energy."""
-    curves = [relaxed.discrete_curve for _, relaxed in found]
-    energies = energies_of(found[0][0].surface, curves, request.smoothness)
-    import os
-    if os.environ.get("LOGE"): print("   energies", first_is_moved, [round(e,2) for e in energies])
-    return found[energies.index(min(energies))]
+    return ContinuedCurve(*found, given_up)
 
 
 def _relaxed(

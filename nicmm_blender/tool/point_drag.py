@@ -80,7 +80,7 @@ class PointDrag(ChangesPoints):
         requests = edited_curve.request(edited, edited.points)
         if requests:  # until there is another curve, the present one is shown
             shown = replace(requests[0], start=self._opened.curve)
-            self._live = LiveCurve(shown, keeps_course=not self.searches_course)
+            self._live = LiveCurve(shown, not self.searches_course, self._is_new)
             self._live.image = self._opened.image
         self._preview = _Preview(self._opened)
         self._last_move = 0.0
