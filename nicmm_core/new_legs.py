@@ -128,9 +128,10 @@ def widened(legs: Sequence[Leg], closed: bool) -> list[Leg]:
     An empty list if no leg would stay.
     """
     new = np.array([leg.is_new for leg in legs])
-    beside = np.convolve(new, [1, 1, 1], "same") > 0
-    if closed:
-        beside = new | np.roll(new, 1) | np.roll(new, -1)
+    before, after = np.roll(new, 1), np.roll(new, -1)
+    if not closed:
+        before[0] = after[-1] = False
+    beside = new | before | after
     if beside.all():
         return []
     begin = int((~beside).argmax()) if closed else 0

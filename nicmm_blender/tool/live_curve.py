@@ -40,7 +40,7 @@ class LiveCurve:
         Whether the start does not pass all control points yet. Then the next step also searches for
         the course of the new leg, without a limit on its work.
     waiting : bool
-        Whether the curve has to be designed from scratch.
+        Whether the curve has to be designed from scratch, or with a new point.
     steps_left : int
         Number of steps that may still follow; 0 if the curve has converged.
     problem : str

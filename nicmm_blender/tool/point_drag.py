@@ -85,7 +85,7 @@ class PointDrag(ChangesPoints):
         self._preview = _Preview(self._opened)
         self._last_move = 0.0
         if self._live is not None and self._is_new:
-            self._live.move(edited.points)
+            self._live.waiting = True  # a search for the new leg takes longer than a frame
         self._show_drag()  # may fail, so it comes before everything that has to be undone then
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
