@@ -148,8 +148,10 @@ class Designer:
             without a start, and `via_points` have no effect. Obstacles, maps and smoothness may
             differ from those of the start. If the start is a converged Design and only painted
             weights differ, only the curve near them moves. Control points may have been added,
-            removed, or moved by up to a tenth of the curve's length. The cost depends on the curve
-            and not on the size of the mesh, so a start suits interactive dragging of a point.
+            removed, or moved by up to a tenth of the curve's length; the legs at a point that came
+            or went may take another course if that is fairer, unless `max_iterations` is given. The
+            cost of a move depends on the curve and not on the size of the mesh, so a start suits
+            interactive dragging of a point.
         max_iterations : int, optional
             Limit on the iterations of the relaxation; only with the method "elastic". If the curve
             has not converged by then, the status is `ITERATION_LIMIT`. For interactive drawing,

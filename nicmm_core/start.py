@@ -29,6 +29,8 @@ from .request import Request, same_request
 
 WITHOUT_START = "; leave start out"
 
+OTHER_ORDER = f"start visits the control_points in another order{WITHOUT_START}"
+
 LONGEST_TRACE = 1.5
 """Longest trace of a control point to its new position, relative to the straight distance."""
 
@@ -119,8 +121,49 @@ def unsettled_vertices(start: Resumable, request: Request, visited: IntArray) ->
     return np.flatnonzero(changed)
 
 
-def moved_start(
+def curve_of_start(
     surface: CurveSurface, start: Resumable | SurfaceCurve, request: Request
+) -> tuple[DiscreteCurve, IntArray | None]:
+    """The curve of a start with nodes.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+        The surface of the start.
+    start : Resumable or SurfaceCurve
+        A curve on the surface. The points of a SurfaceCurve must be given in the face of the
+        segment after them.
+    request : Request
+
+    Returns
+    -------
+    DiscreteCurve
+        The curve with its former control points.
+    (k,) int array or None
+        For each control node, the index of its control point in the request that the start answers;
+        None for a SurfaceCurve.
+
+    Raises
+    ------
+    CurveError
+        If the start is not simple, or open where a closed curve is requested or vice versa.
+    """
+    if isinstance(start, Resumable):
+        curve, visited = start.curve, start.visited
+    else:
+        curve, visited = place_nodes(surface, start, WARM.levels[-1]), None
+        if not is_simple(surface, curve):
+            raise CurveError("start crosses or touches itself; pass a simple curve")
+    if curve.closed != request.closed:
+        kinds = ("an open", "a closed") if request.closed else ("a closed", "an open")
+        raise CurveError(
+            f"start is {kinds[0]} curve and {kinds[1]} one is requested{WITHOUT_START}"
+        )
+    return curve, visited
+
+
+def moved_start(
+    surface: CurveSurface, curve: DiscreteCurve, visited: IntArray | None, request: Request
 ) -> tuple[DiscreteCurve, IntArray]:
     """Move the curve of a start to the control points of a request.
 
@@ -133,9 +176,8 @@ def moved_start(
     ----------
     surface : CurveSurface
         The surface of the start.
-    start : Resumable or SurfaceCurve
-        A curve on the surface. The points of a SurfaceCurve must be given in the face of the
-        segment after them.
+    curve, visited : DiscreteCurve and (c,) int array or None
+        The curve of the start, from `curve_of_start`.
     request : Request
         The request with the new control points.
 
@@ -149,26 +191,14 @@ def moved_start(
     Raises
     ------
     CurveError
-        If the start is open where a closed curve is requested or vice versa, is not simple, visits
-        the points in another order, or has another number of control points and none at an
-        unchanged position; if a point has moved by more than `LONGEST_MOVE` times the curve's
-        length; or if the moved curve would cross itself.
+        If the start visits the points in another order, or has another number of control points
+        and none at an unchanged position; if a point has moved by more than `LONGEST_MOVE` times
+        the curve's length; or if the moved curve would cross itself.
     """
-    if isinstance(start, Resumable):
-        curve, visited = start.curve, start.visited
-    else:
-        curve, visited = place_nodes(surface, start, WARM.levels[-1]), None
-        if not is_simple(surface, curve):
-            raise CurveError("start crosses or touches itself; pass a simple curve")
-    if curve.closed != request.closed:
-        kinds = ("an open", "a closed") if request.closed else ("a closed", "an open")
-        raise CurveError(
-            f"start is {kinds[0]} curve and {kinds[1]} one is requested{WITHOUT_START}"
-        )
     if len(request.points) == len(curve.control_nodes):
         visited = _nearest_numbering(surface.mesh, curve, visited, request)
     else:
-        curve, visited = _with_other_points(surface, curve, request)
+        curve, visited = with_other_points(surface, curve, request)
     if request.order == "given" and visited[0] != 0:
         curve, visited = _rotated_to_first(surface, curve, visited)
     _check_moves(surface.mesh, curve, visited, request.points)
@@ -233,12 +263,20 @@ def _check_moves(
     distance = np.linalg.norm(away, axis=1)
     longest = LONGEST_MOVE * curve.length
     if distance.max() > longest:
-        worst = PointName("control_points", int(visited[distance.argmax()]))
-        raise CurveError(
-            f"{worst} is {distance.max() / curve.length:.0%} of the curve's length away from its "
-            f"position on start; the limit is {LONGEST_MOVE:.0%}{WITHOUT_START}",
-            worst,
-        )
+        raise too_far(int(visited[distance.argmax()]), distance.max() / curve.length)
+
+
+def too_far(number: int, move: float) -> CurveError:
+    """The error that a control point, given by its index, is too far from the start.
+
+    `move` is its distance relative to the length of the start.
+    """
+    point = PointName("control_points", number)
+    return CurveError(
+        f"{point} is {move:.0%} of the curve's length away from its position on start; the limit "
+        f"is {LONGEST_MOVE:.0%}{WITHOUT_START}",
+        point,
+    )
 
 
 def _nearest_numbering(
@@ -274,7 +312,28 @@ def _rotated_to_first(
     return place_nodes(surface, whole, WARM.levels[-1]), np.roll(visited, -first)
 
 
-def _with_other_points(
+def unchanged_points(surface: CurveSurface, curve: DiscreteCurve, request: Request) -> IntArray:
+    """For each control point of a request, (k,), its place in the order of a start, or -1.
+
+    Raises
+    ------
+    CurveError
+        If no control point is where it was.
+    """
+    mesh, there = surface.mesh, request.points.positions(surface.mesh)
+    at_controls = curve.polyline[curve.node_index[curve.control_nodes]]
+    distance = np.linalg.norm(there[:, None] - at_controls.positions(mesh), axis=2)
+    same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal
+    if not same.any():
+        raise CurveError(
+            f"start has {len(at_controls)} control points, {len(there)} are requested, "
+            f"and none of them is where it was{WITHOUT_START}"
+        )
+    places: IntArray = np.where(same, distance.argmin(axis=1), -1)
+    return places
+
+
+def with_other_points(
     surface: CurveSurface, curve: DiscreteCurve, request: Request
 ) -> tuple[DiscreteCurve, IntArray]:
     """Replace the control nodes of a curve by nodes at, or nearest to, the points of a request.
@@ -286,16 +345,9 @@ def _with_other_points(
         For each control node, the index of its control point in the request.
     """
     mesh, polyline, in_order = surface.mesh, curve.polyline, request.order == "given"
-    there = request.points.positions(mesh)
-    at_controls = curve.node_index[curve.control_nodes]
-    distance = np.linalg.norm(there[:, None] - polyline[at_controls].positions(mesh), axis=2)
-    same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal
-    if not same.any():
-        raise CurveError(
-            f"start has {len(at_controls)} control points, {len(there)} are requested, "
-            f"and none of them is where it was{WITHOUT_START}"
-        )
-    index = at_controls[distance.argmin(axis=1)]
+    there, unchanged = request.points.positions(mesh), unchanged_points(surface, curve, request)
+    same = unchanged >= 0
+    index = curve.node_index[curve.control_nodes[unchanged]]
     visited = np.arange(len(there))
     if in_order and curve.closed:
         # Begin the polyline at the first unchanged point.
@@ -319,7 +371,7 @@ def _with_other_points(
         visited = np.argsort(index)
     index = index[visited]
     if (np.diff(index) <= 0).any():
-        raise CurveError(f"start visits the control_points in another order{WITHOUT_START}")
+        raise CurveError(OTHER_ORDER)
     if not curve.closed:
         polyline, index = polyline[index[0] : index[-1] + 1], index - index[0]
     whole = curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, index)

@@ -6,7 +6,7 @@ a large mesh courses are searched for on a coarse mesh (`coarsening`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,6 +19,7 @@ from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
 from .mapped_surface import MappedSurface
+from .new_legs import Leg, request_for_leg, with_new_legs
 from .path.initial_path import find_initial_path, path_curve
 from .progress import checkpoint
 from .relaxation.curve_nodes import CurveSurface
@@ -115,6 +116,38 @@ class StartSearch:
             if changed is not None and is_apart(start.surface, changed, known):
                 known.append(changed)
                 yield replace(start, curve=changed)
+
+    def with_new_legs(
+        self, request: Request, curve: DiscreteCurve, legs: Sequence[Leg]
+    ) -> Iterator[InitialCurve]:
+        """A start with courses of its new legs; the best of each leg come first.
+
+        There are none if no leg is new.
+
+        Parameters
+        ----------
+        request : Request
+        curve : DiscreteCurve
+            The curve of the start.
+        legs : sequence of Leg
+            Its legs, from `legs_of`.
+        """
+        surface, new = self.surface.of(request), [i for i, leg in enumerate(legs) if leg.is_new]
+        asked = [request_for_leg(surface, curve, legs, number, request) for number in new]
+        found = [
+            self.courses(of_leg, most_failures=MOST_FAILURES, search_size=PART)
+            for of_leg, _ in asked
+        ]
+        for courses in zip(*found, strict=False):
+            own = {}
+            for number, (_, passed), course in zip(new, asked, courses, strict=True):
+                assert isinstance(course.curve, DiscreteCurve)
+                at_points = course.curve.control_nodes[passed]
+                places = course.curve.nodes.places[at_points[0] : at_points[-1] + 1]
+                own[number] = places, at_points - at_points[0]
+            changed = with_new_legs(surface, curve, legs, own, request)
+            if changed is not None:
+                yield InitialCurve(*changed, surface, self.surface.unit)
 
     def by_path(self, request: Request) -> InitialCurve:
         """The initial path."""

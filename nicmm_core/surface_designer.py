@@ -5,12 +5,14 @@ This is the pipeline of a checked request; `design` is its entry point.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from .continued import ContinuedCurve, chosen, has_detour
 from .design_result import Design
 from .errors import CurveError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -19,12 +21,20 @@ from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
 from .mapped_surface import MappedSurface
+from .new_legs import Leg, legs_of, may_need_search, widened
 from .progress import CancelledError, checkpoint, subrange
+from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
 from .request import Request
-from .start import WITHOUT_START, Resumable, moved_start, unsettled_vertices
-from .start_search import InitialCurve, StartSearch
+from .start import (
+    WITHOUT_START,
+    Resumable,
+    curve_of_start,
+    moved_start,
+    unsettled_vertices,
+)
+from .start_search import InitialCurve, StartSearch, is_new
 from .status import Status
 from .symmetry.half_order import in_shortest_order
 from .symmetry.half_search import NO_SYMMETRIC_CURVE, symmetric_by_halves
@@ -45,6 +55,9 @@ LIMIT_TO_USUAL_ITERATIONS = 10
 
 Since most curves converge long before the limit, reported progress rises quickly at first.
 """
+
+TRIED = 2
+"""Greatest number of courses of new legs that are relaxed for a start."""
 
 COLLISIONS = 3
 """Number of designs after a collision for which strands are assumed to collide again."""
@@ -109,33 +122,81 @@ class SurfaceDesigner:
         max_iterations: int | None,
         started: float,
     ) -> Design:
-        """Move a start to the control points and relax it."""
+        """Move a start to the control points and relax it.
+
+        If points have come or gone, courses of the new legs are tried as well.
+        """
         surface = self._search.surface.of(request)
-        curve, visited = moved_start(surface, start, request)
-        collisions, unsettled = 0, None
-        if isinstance(start, Resumable):
-            collisions, unsettled = start.collisions, unsettled_vertices(start, request, visited)
-        # If strands collide, an attempt without tracing every iteration would fail.
-        config = replace(WARM, defer_tracing=not collisions)
-        begin = InitialCurve(
-            curve,
-            visited,
-            surface,
-            self._search.surface.unit,
-            collisions=collisions,
-            unsettled=unsettled,
-        )
-        if request.mirror is None:
-            relaxed = _relaxed(request, begin, config, max_iterations)
-            return self._relaxed_design(request, begin, relaxed, started)
-        if max_iterations is not None:
-            config = replace(config, most_iterations=max_iterations)
-        found = relaxed_symmetric(
-            request, begin, None, curve.length, partial(_relaxed_unless_cancelled, request), config
-        )
-        if found is None:
-            raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
-        return self._relaxed_design(request, *found, started)
+        curve, numbers = curve_of_start(surface, start, request)
+        legs: list[Leg] = []
+        if max_iterations is None and len(request.points) != len(curve.control_nodes):
+            legs = legs_of(surface, curve, request)
+            if not may_need_search(surface, curve, legs, request):
+                legs = []
+        found, problem = [], None
+        try:
+            moved, visited = moved_start(surface, curve, numbers, request)
+            begin = InitialCurve(moved, visited, surface, self._search.surface.unit)
+            if isinstance(start, Resumable):
+                unsettled = unsettled_vertices(start, request, visited)
+                begin = replace(begin, collisions=start.collisions, unsettled=unsettled)
+            found.append(_continued(request, begin, max_iterations))
+        except CurveError as error:
+            if not legs:
+                raise
+            problem = error
+        cancelled = False
+        if legs and not (found and found[0].relaxed.status is Status.CANCELLED):
+            cancelled = self._try_new_legs(request, curve, legs, found)
+            if problem is not None and not found:
+                raise problem
+        best = chosen(request, curve, found) if legs else found[0]
+        design = self._relaxed_design(request, best.start, best.relaxed, started)
+        return replace(design, status=Status.CANCELLED) if cancelled else design
+
+    def _try_new_legs(
+        self,
+        request: Request,
+        curve: DiscreteCurve,
+        legs: list[Leg],
+        found: list[ContinuedCurve],
+    ) -> bool:
+        """Append curves with other courses of the new legs of a start.
+
+        If all curves bend far more than the start, the neighbouring legs are searched for as well.
+        Returns whether the caller has stopped it after a first curve.
+        """
+        try:
+            self._try_legs(request, curve, legs, found, 1)
+            if has_detour(curve, found):
+                self._try_legs(request, curve, widened(legs, curve.closed), found, 2)
+        except CancelledError:
+            if not found:
+                raise
+            return True
+        return False
+
+    def _try_legs(
+        self,
+        request: Request,
+        curve: DiscreteCurve,
+        legs: list[Leg],
+        found: list[ContinuedCurve],
+        given_up: int,
+    ) -> None:
+        """Append curves with courses of some legs of a start."""
+        tried: list[DiscreteCurve] = []
+        for begin in self._search.with_new_legs(request, curve, legs):
+            if not is_new(begin, tried):
+                continue
+            assert isinstance(begin.curve, DiscreteCurve)
+            tried.append(begin.curve)
+            with contextlib.suppress(CurveError):  # there may be no symmetric curve
+                found.append(_continued(request, begin, None, given_up))
+            if found and found[-1].relaxed.status is Status.CANCELLED:
+                raise CancelledError
+            if len(tried) == TRIED:
+                break
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
@@ -259,6 +320,31 @@ class SurfaceDesigner:
                 np.zeros(0, np.int64) if converged else start.unsettled,
             ),
         )
+
+
+def _continued(
+    request: Request, begin: InitialCurve, max_iterations: int | None, given_up: int = 0
+) -> ContinuedCurve:
+    """Relax a start that has been fitted to the control points.
+
+    Raises
+    ------
+    CurveError
+        If a symmetric curve is requested and the start cannot be made symmetric.
+    """
+    # If strands collide, an attempt without tracing every iteration would fail.
+    config = replace(WARM, defer_tracing=not begin.collisions)
+    if request.mirror is None:
+        relaxed = _relaxed(request, begin, config, max_iterations)
+        return ContinuedCurve(begin, relaxed, given_up)
+    if max_iterations is not None:
+        config = replace(config, most_iterations=max_iterations)
+    assert isinstance(begin.curve, DiscreteCurve)
+    relax = partial(_relaxed_unless_cancelled, request)
+    found = relaxed_symmetric(request, begin, None, begin.curve.length, relax, config)
+    if found is None:
+        raise CurveError(f"start cannot be made symmetric about the mirror{WITHOUT_START}")
+    return ContinuedCurve(*found, given_up)
 
 
 def _relaxed(

@@ -36,16 +36,22 @@ class LiveCurve:
         Request with the current points and the last curve as its start.
     keeps_course : bool
         Whether the curve keeps its course; otherwise every move needs a design from scratch.
+    has_new_point : bool
+        Whether the start does not pass all control points yet. Then the next step also searches for
+        the course of the new leg, without a limit on its work.
     waiting : bool
-        Whether the curve has to be designed from scratch.
+        Whether the curve has to be designed from scratch, or with a new point.
     steps_left : int
         Number of steps that may still follow; 0 if the curve has converged.
     problem : str
         Why there is no curve through the points; empty if there is one.
     """
 
-    def __init__(self, request: DesignRequest, keeps_course: bool = True) -> None:
+    def __init__(
+        self, request: DesignRequest, keeps_course: bool = True, has_new_point: bool = False
+    ) -> None:
         self.request, self.keeps_course = request, keeps_course
+        self.has_new_point = has_new_point
         self.waiting, self.steps_left = request.start is None or not keeps_course, 0
         self.problem = ""
         self.image: SurfaceCurve | None = None
@@ -83,7 +89,7 @@ class LiveCurve:
 
     def set_result(self, design: Design | Exception) -> None:
         """Store the result of a design from scratch, which may be an exception."""
-        self.waiting, self.steps_left = False, 0
+        self.waiting, self.has_new_point, self.steps_left = False, False, 0
         if isinstance(design, Exception):
             self.problem = str(design)
         elif design.curves:
@@ -106,7 +112,7 @@ class LiveCurve:
                 design = designer.design(
                     request.points,
                     order="given",
-                    max_iterations=iterations,
+                    max_iterations=None if self.has_new_point else iterations,
                     start=request.start,
                     **request.options,
                 )
@@ -117,6 +123,7 @@ class LiveCurve:
             self.problem, self.steps_left = message_of(error, request), 0
         else:
             self.request, self.problem = replace(request, start=design), ""
+            self.has_new_point = False
             self.image = image[0] if image else None
             if design.status is not nicmm.Status.ITERATION_LIMIT:
                 self.steps_left = 0

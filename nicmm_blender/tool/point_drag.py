@@ -80,12 +80,12 @@ class PointDrag(ChangesPoints):
         requests = edited_curve.request(edited, edited.points)
         if requests:  # until there is another curve, the present one is shown
             shown = replace(requests[0], start=self._opened.curve)
-            self._live = LiveCurve(shown, keeps_course=not self.searches_course)
+            self._live = LiveCurve(shown, not self.searches_course, self._is_new)
             self._live.image = self._opened.image
         self._preview = _Preview(self._opened)
         self._last_move = 0.0
         if self._live is not None and self._is_new:
-            self._live.move(edited.points)
+            self._live.waiting = True  # a search for the new leg takes longer than a frame
         self._show_drag()  # may fail, so it comes before everything that has to be undone then
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)

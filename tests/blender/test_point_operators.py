@@ -379,6 +379,38 @@ def test_every_move_of_a_drag_is_bounded(empty_scene, curve, sphere, places):
     np.testing.assert_allclose(passed[live.curve.control_index][1], place, atol=ROUNDING)
 
 
+def test_the_leg_of_a_new_point_is_searched_for_before_it_is_dragged(
+    empty_scene, curve, sphere, monkeypatch
+):
+    """The first move after a point was added has no limit; the next ones are bounded."""
+    limits = []
+    core_designer = empty_scene.core.Designer
+    design = core_designer.design
+
+    def noted(*arguments, max_iterations=None, **options):
+        limits.append(max_iterations)
+        return design(*arguments, max_iterations=max_iterations, **options)
+
+    monkeypatch.setattr(core_designer, "design", noted)
+    edited_curve = module(empty_scene, "outputs.edited_curve")
+    opened = edited_curve.open_curve(bpy.context, curve)
+    positions = opened.positions()
+    middle = positions[0] + positions[-1] + [0.0, 0.0, 0.3]
+
+    def with_new(height):
+        place = sphere.closest_point_on_mesh(middle + [0.0, 0.0, height])[1]
+        point = edited_curve.surface_points_at(opened, np.array([place]), "position")
+        return edited_curve.with_point(opened.points, len(opened.points), point)
+
+    (request,) = edited_curve.request(opened, with_new(0.0))
+    live = module(empty_scene, "tool.live_curve").LiveCurve(request, has_new_point=True)
+    live.move(with_new(0.02))
+    assert not live.waiting and not live.steps_left and not live.has_new_point
+    assert len(live.curve.control_index) == len(opened.points) + 1
+    live.move(with_new(0.1))
+    assert not live.waiting and limits[0] is None and 1 <= limits[1] <= 3
+
+
 def test_after_a_jump_the_curve_is_designed_from_scratch(empty_scene, curve):
     live, moved, _ = live_of(empty_scene, curve, 1)
     before = live.curve

@@ -5,11 +5,14 @@ from dataclasses import replace
 import igl
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
-from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core import shapes, start_search, surface_designer
+from nicmm_core.geometry.curve import curve_on_mesh, points_of_leg
 from nicmm_core.geometry.surface_points import nearest_points
+from nicmm_core.new_legs import Leg, widened
+from nicmm_core.progress import CancelledError
 from tests.core.checks import (
     apart,
     assert_valid_curve,
@@ -561,3 +564,132 @@ def distances_to_polyline(points, line):
     share = np.einsum("psd,sd->ps", points[:, None] - start, step) / (step**2).sum(axis=1)
     nearest = start + share.clip(0.0, 1.0)[..., None] * step
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
+
+
+def limbs_with_points():
+    """A body with limbs, and five points far apart on it."""
+    mesh = shapes.creature(3, resolution=48, faces=2_000)
+    return mesh, far_apart(mesh.vertices, np.flatnonzero(mesh.referenced), 5)
+
+
+def legs_apart(one, other, leg):
+    """Greatest distance of a leg of one curve from another curve."""
+    own = one.points[points_of_leg(one, leg)]
+    return cKDTree(other.points).query(own)[0].max()
+
+
+class TestNewLegs:
+    """Control points that have joined or left a start."""
+
+    def test_a_point_on_the_curve_searches_for_nothing(self, ball, monkeypatch):
+        designer, points = nicmm.Designer(ball), on_ball(ball)
+        start = designer.design(points)
+        curve = start.curves[0]
+        at = int(curve.control_index[2]) + 10
+        faces = np.insert(points.faces, 3, curve.faces[at])
+        weights = np.insert(points.barycentric, 3, curve.barycentric[at], axis=0)
+        monkeypatch.setattr(start_search.StartSearch, "with_new_legs", None)
+        now = designer.design(nicmm.SurfacePoints(faces, weights), start=start)
+        assert apart(now.curves[0].points, curve.points) < 0.02
+
+    @pytest.mark.parametrize("end", [0, -1])
+    def test_an_open_curve_goes_on_along_a_great_circle(self, ball, end):
+        """A point beyond an end extends the curve, which has no bending on a great circle."""
+        angles = np.radians([0.0, 50.0, 100.0, 140.0])
+        given = nearest_points(ball, circle(angles))[0]
+        order = np.arange(4) if end else np.arange(4)[::-1]
+        fewer = order[order != 3]
+        designer = nicmm.Designer(ball)
+        start = designer.design(given[fewer], closed=False)
+        far = nearest_points(ball, circle(np.radians([110.0])))[0]
+        faces, weights = given[fewer].faces, given[fewer].barycentric
+        at = 3 if end else 0
+        longer = nicmm.SurfacePoints(
+            np.insert(faces, at, far.faces), np.insert(weights, at, far.barycentric, axis=0)
+        )
+        now = designer.design(longer, closed=False, start=start).curves[0]
+        assert_valid_curve(ball, now, longer.positions(ball), closed=False)
+        assert np.abs(now.points[:, 2]).max() < 5e-3
+        assert now.length == pytest.approx(np.radians(110.0), rel=5e-3)
+
+    def test_a_point_behind_a_limb_makes_no_detour(self):
+        """The nearest position in space may be far away along the surface."""
+        mesh, chosen = limbs_with_points()
+        designer = nicmm.Designer(mesh)
+        start = designer.design(chosen[:4], order="shortest")
+        curve = start.curves[0]
+        candidates = np.flatnonzero(
+            cKDTree(curve.points).query(mesh.vertices)[0] < 0.09 * curve.length
+        )
+        visited = [chosen[number] for number in start.resumable.visited]
+        for vertex in candidates[:: len(candidates) // 12].tolist():
+            if vertex in visited:
+                continue
+            asked = [*visited, vertex]
+            try:
+                now = designer.design(asked, start=start)
+            except nicmm.CurveError as error:
+                assert "away from its" in str(error) or "detour" in str(error)
+                continue
+            anew = designer.design(asked)
+            assert_valid_design(mesh, now)
+            assert now.curves[0].length < 1.5 * anew.curves[0].length
+
+    def test_the_other_legs_keep_their_courses(self, ball):
+        """They only move a little near the ends of the new leg."""
+        designer, points = nicmm.Designer(ball), on_ball(ball)
+        start = designer.design(points)
+        raised = circle([(ANGLES[1] + ANGLES[2]) / 2]) + [[0.0, 0.0, 0.4]]
+        place = nearest_points(ball, raised)[0]
+        asked = nicmm.SurfacePoints(
+            np.insert(points.faces, 2, place.faces),
+            np.insert(points.barycentric, 2, place.barycentric, axis=0),
+        )
+        now = designer.design(asked, start=start).curves[0]
+        assert_valid_curve(ball, now, asked.positions(ball))
+        assert legs_apart(now, start.curves[0], 4) < 0.1
+        assert legs_apart(now, start.curves[0], 1) > 0.2
+
+    def test_with_few_iterations_nothing_is_searched_for(self, ball, monkeypatch):
+        designer, points = nicmm.Designer(ball), on_ball(ball)
+        start = designer.design(points)
+        monkeypatch.setattr(start_search.StartSearch, "with_new_legs", None)
+        raised = nearest_points(ball, circle([4.3]) + [[0.0, 0.0, 0.3]])[0]
+        asked = nicmm.SurfacePoints(
+            np.insert(points.faces, 4, raised.faces),
+            np.insert(points.barycentric, 4, raised.barycentric, axis=0),
+        )
+        now = designer.design(asked, start=start, max_iterations=3)
+        assert_valid_curve(ball, now.curves[0], asked.positions(ball))
+
+    def test_a_cancelled_search_returns_the_moved_curve(self, ball, monkeypatch):
+        designer, points = nicmm.Designer(ball), on_ball(ball)
+        start = designer.design(points)
+
+        def cancelled(*_):
+            raise CancelledError
+            yield
+
+        monkeypatch.setattr(start_search.StartSearch, "with_new_legs", cancelled)
+        raised = nearest_points(ball, circle([4.3]) + [[0.0, 0.0, 0.3]])[0]
+        asked = nicmm.SurfacePoints(
+            np.insert(points.faces, 4, raised.faces),
+            np.insert(points.barycentric, 4, raised.barycentric, axis=0),
+        )
+        now = designer.design(asked, start=start)
+        assert now.status is nicmm.Status.CANCELLED
+        assert_valid_curve(ball, now.curves[0], asked.positions(ball))
+
+    @pytest.mark.parametrize("closed", [True, False])
+    def test_widened_legs_cover_the_same_points(self, closed):
+        """New legs are joined with both neighbours; nothing is left if no leg would stay."""
+        ends = np.arange(8)
+        legs = [
+            Leg(np.array([i, (i + 1) % 8]), np.array([10 * i, 10 * i + 10]), i in (0, 4))
+            for i in ends[: None if closed else -1].tolist()
+        ]
+        wide = widened(legs, closed)
+        assert [leg.is_new for leg in wide].count(True) == 2
+        kept = [leg.points.tolist() for leg in wide if not leg.is_new]
+        assert kept == [[2, 3], [6, 7]]
+        assert widened(legs[:2], False) == []

@@ -745,6 +745,8 @@ def courses(blender: Blender) -> None:
     blender.key("ctrl+shift+Return")
     time.sleep(1.0)
     check(not blender.do("value = helper.is_modal()"), "beside the curve there is no choice")
+    blender.key("Escape")  # the message covers the view, and the next click would only close it
+    time.sleep(0.5)
 
 
 def via_points(blender: Blender) -> None:
