@@ -19,6 +19,10 @@ from . import checker
 AT_JUNCTION = 1e-9
 """Distance up to which a point is a junction, in bounding-box diagonals."""
 
+SNAP = 1e-5
+"""Distance, in edges, up to which cuts move to vertices; libigl needs far too much memory on thinner
+triangles."""
+
 
 def contacts(
     mesh: nicmm.Mesh,
@@ -72,7 +76,7 @@ def least_distance(
     among : (n,) bool array, optional
         The points of the first curve that are measured; by default all.
     """
-    first = nicmm.cut_mesh(mesh, other_with_points(mesh, other, spacing), snap=0.0)
+    first = nicmm.cut_mesh(mesh, other_with_points(mesh, other, spacing), snap=SNAP)
     parts = FaceParts(first.faces, first.source_face, first.corner_weights(mesh))
     curve, segment_faces = checked_curve(mesh, one)
     inside = weights_in_faces(mesh, curve.faces, curve.barycentric, segment_faces)
@@ -84,7 +88,7 @@ def least_distance(
     there = curve_on_mesh(
         first.mesh, curve.closed, points.faces, points.barycentric, np.zeros(0, np.int64)
     )
-    second = nicmm.cut_mesh(first.mesh, there, snap=0.0)
+    second = nicmm.cut_mesh(first.mesh, there, snap=SNAP)
     measured = second.chain
     if among is not None:
         measured = measured[among[segment[second.chain_point]]]
