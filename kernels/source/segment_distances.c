@@ -165,6 +165,17 @@ static int least_distance(const Mesh *mesh, const Propagation *work, int64_t sid
     return OK;
 }
 
+/* Whether a segment lies in the line of an edge, beside the window on it. Its straight paths run along
+   the edge and continue at the vertices; none leads through the window. Rounding bends the line at
+   the vertices, and without this test such paths would turn around them. */
+static int is_grazed(const Window *window, double scale)
+{
+    double left = lesser(window->start.x, window->end.x);
+    double right = greater(window->start.x, window->end.x);
+    return lesser(window->start.y, window->end.y) >= -scale &&
+           (left > window->high + scale || right < window->low - scale);
+}
+
 /* Adds a window on a side of a face, given in the plane of this face, which has y > 0. Nothing is
    added at a boundary, or if the window is of no use. */
 static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const Window *given,
@@ -193,6 +204,7 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
     window.at_high.x = sign * at_high.x;
     window.at_high.y = -at_high.y;
     if (!(window.high - window.low > work->scale)) return OK;
+    if (is_grazed(&window, work->scale)) return OK;
     double least;
     TRY(least_distance(mesh, work, beyond, &window, &least));
     if (least == INFINITY) return OK;

@@ -94,3 +94,31 @@ def test_several_segments_have_the_least_of_their_distances(ball):
     each = np.min([SegmentDistances(ball, part, 0.8).at(points) for part in parts], axis=0)
     near = each < 0.8
     np.testing.assert_allclose(both[near], each[near], rtol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_paths_along_a_line_of_edges_do_not_turn_at_its_vertices(share):
+    """A segment ends on an edge, and nearly straight lines of edges continue it, as on a grid."""
+    count = 9
+    x, y = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    first = (count * x + y)[:-1, :-1].ravel()
+    faces = np.concatenate(
+        [
+            np.stack([first, first + count, first + count + 1], axis=1),
+            np.stack([first, first + count + 1, first + 1], axis=1),
+        ]
+    )
+    face = np.array([faces.tolist().index([40, 49, 50])])
+    segments = FaceSegments(face, np.array([[0.2, 0.5, 0.3]]), np.array([[0.0, share, 1 - share]]))
+    for seed in range(20):
+        moved = 1e-5 * np.random.default_rng(seed).standard_normal((2, count**2))
+        flat = np.stack([x.ravel() + moved[0], y.ravel() + moved[1], 0.0 * moved[0]], axis=1)
+        mesh = nicmm.Mesh(flat, faces)
+        points = random_surface_points(mesh, 120, seed=6)
+        places = points.positions(mesh)
+        start, end = segments.positions(mesh)
+        expected = distance_to_segments(places, *np.broadcast_arrays(start, end, places)[:2])
+        found = SegmentDistances(mesh, segments, 3.0).at(points)
+        near = expected < 2.9
+        assert 30 < near.sum()
+        np.testing.assert_allclose(found[near], expected[near], rtol=1e-12, atol=1e-12)
