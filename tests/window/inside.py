@@ -404,14 +404,14 @@ class Helper:
         return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
     @classmethod
-    def middle_of_other(cls, name, leg):
-        """A point of a leg of a curve that is not active, near its middle."""
+    def middle_of_other(cls, name, leg, share=0.5):
+        """A point of a leg of a curve that is not active, by default near its middle."""
         record = import_module(f"{MODULE}.scene.curve_record")
         curve = bpy.data.objects[name]
         surface = record.surface_of(curve, record.mesh_of(curve))
         (found,) = record.read_curves(curve, surface)
         index = import_module(f"{CORE}.geometry.curve").points_of_leg(found, leg)
-        return found.points[index[len(index) // 2]].tolist()
+        return found.points[index[int(share * len(index))]].tolist()
 
     @classmethod
     def junctions(cls, curve=None):
