@@ -45,25 +45,31 @@ DOOR = (
 CORNERS = (0, 2, 3, 4)
 SILL = ((0.5, -0.46, -0.34), (0.5, 0.46, -0.34))
 MOULDING = ((0.48, -1.05, -0.10), (0.49, -0.7, -0.04))
-LOWER = (0.5, -0.24, -0.30)
+LOWER = (0.5, -0.30, -0.25)
 """Places on the side of the car; the last one is where a corner of the door is dragged."""
 
-CLEARANCE, UPWARDS = 0.1, 0.65
+CLEARANCE, UPWARDS = 0.12, 0.65
 """Distance of the sill from the door, and how far up its front edge the moulding ends."""
 
 STRAP = ((0.11, 0.0, 0.52), (0.0, 0.0, 0.30), (-0.12, 0.0, 0.06))
 GARTER = ((0.17, -0.05, -0.24), (0.115, -0.08, -0.27), (0.06, -0.05, -0.24))
 """Inside the figure: from a shoulder to the hip, and across a thigh."""
 
+BEHIND = 0.05
+"""Depth that a curve reaches only behind the body or the thigh."""
+
+NEW_POSE = {"Chest": (0.1, -0.3, 0.1), "Knee.L": (-0.95, 0.0, 0.12)}
+"""Angles of bones."""
+
 
 def designers(blender: Blender) -> None:
     """A mirrored body, a car with a bevel, and a posed figure."""
     blender.do("helper.area().spaces.active.show_region_ui = False")
-    blender.do("bodies.dress_form()\nhelper.look(0.35, -1.0, 0.12, 3.3)")
+    blender.do("bodies.dress_form()\nhelper.look(0.35, -1.0, 0.12, 2.9)")
     dress(blender)
-    blender.do("bodies.car()\nhelper.look(1.0, -0.55, 0.3, 3.6)")
+    blender.do("bodies.car()\nhelper.look(1.0, -0.5, 0.3, 3.3)")
     panels(blender)
-    blender.do("bodies.figure()\nhelper.look(0.3, -1.0, 0.1, 2.9)")
+    blender.do("bodies.figure()\nhelper.look(0.3, -1.0, 0.1, 2.7)")
     straps(blender)
 
 
@@ -107,8 +113,8 @@ def panels(blender: Blender) -> None:
     step("A sill below it, which keeps a distance")
     begin(blender, closed=False, avoid_others=True, clearance=CLEARANCE)
     click_seen(blender, SILL, "Car")
-    check_clear(blender)
     end(blender, "Sill")
+    check_clear(blender, "Sill")
 
     step("A moulding that ends on the door")
     click_seen(blender, MOULDING, "Car")
@@ -147,7 +153,7 @@ def drag_door(blender: Blender) -> None:
     check(junctions == [[2, "Door"]], "the junction stays")
     gap = blender.do("value = helper.gap('Moulding', 'Door')")
     check(gap < ON_CURVE, f"the moulding ends on the door ({gap:.1e})")
-    check_clear(blender)
+    check_clear(blender, "Sill")
     for name in ("Door", "Sill", "Moulding"):
         check_on_surface(blender, "Car", name)
     undo_and_redo(blender, [before, state(blender)], "of all curves", BESIDE)
@@ -155,38 +161,48 @@ def drag_door(blender: Blender) -> None:
 
 
 def straps(blender: Blender) -> None:
-    """A strap round a posed body, another course, a garter; they follow the pose."""
-    step("A posed figure: a strap from the shoulder to the hip, and round the back")
+    """A strap round a posed body, and a garter by another course; both follow the pose."""
+    step("A posed figure: a strap from a shoulder to the hip, and round the back")
     begin(blender)
     states = click_seen(blender, STRAP, "Figure")
     undo_and_redo(blender, states, "of the strap", BESIDE)
     check_on_surface(blender, "Figure")
+    check(blender.do("value = max(y for _, y, _ in helper.line())") > BEHIND, "round the back")
     blender.shot("27-strap")
+    end(blender, "Strap")
 
-    step("Another course")
+    step("A garter: the fairest curve is a loop on the thigh; another course leads round it")
+    click_seen(blender, GARTER, "Figure")
     before = state(blender)
     begin_choice(blender)
     count, first = blender.do("value = helper.courses()")
-    check(count > 1, "several courses")
+    around = "max(y for _, y, _ in helper.chosen_course())"
+    number = first
+    while blender.do(f"value = {around}") < BEHIND:
+        number += 1
+        check(number < first + count, "a course round the thigh")
+        blender.key("Down")
+        blender.wait(f"helper.courses() == [{count}, {number % count}]", "the next course")
     blender.shot("27-courses")
-    for number in range(1, count):
-        blender.key("Down")
-        blender.wait(f"helper.courses() == [{count}, {(first + number) % count}]", "next")
-        blender.shot(f"27-courses-{number}")
-    blender.key("Escape")
+    blender.key("Return")
     blender.wait("not helper.is_modal()", "the end of the choice")
-    end(blender, "Strap")
+    blender.wait(f"helper.state() != {before!r}", "the chosen course")
+    check(blender.do("value = max(y for _, y, _ in helper.line())") > BEHIND, "round the thigh")
+    check_on_surface(blender, "Figure")
+    undo_and_redo(blender, [before, state(blender)], "of the choice", BESIDE)
+    end(blender, "Garter")
 
-    step("Garter")
-    click_seen(blender, GARTER, "Figure")
-    blender.shot("27-garter")
-    begin_choice(blender)
-    count, first = blender.do("value = helper.courses()")
-    for number in range(1, count):
-        blender.key("Down")
-        blender.wait(f"helper.courses() == [{count}, {(first + number) % count}]", "next")
-        blender.shot(f"27-garter-{number}")
-    blender.key("Escape")
+    step("With Live both follow the pose")
+    names = ("Strap", "Garter")
+    old = blender.do(f"value = [helper.points_of(name) for name in {names}]")
+    blender.do(f"bpy.context.scene.nicmm_live_update = True\nbodies.pose({NEW_POSE})")
+    for name, points in zip(names, old, strict=True):
+        blender.wait(f"helper.points_of({name!r}) != {points!r}", f"{name} follows")
+    blender.wait("not helper.live_works()", "the end of Live")
+    for name in names:
+        check_on_surface(blender, "Figure", name)
+    blender.shot("27-pose")
+    blender.do("bpy.context.scene.nicmm_live_update = False")
 
 
 def begin(blender: Blender, **settings) -> None:
@@ -229,10 +245,8 @@ def check_on_surface(blender: Blender, body: str, curve: str | None = None) -> N
     check(away < ON_SURFACE, f"{curve} is on the shown surface ({away:.1e} diagonals)")
 
 
-def check_clear(blender: Blender) -> None:
-    """Check that the sill keeps its distance from the door."""
-    name = blender.do("value = helper.curve().name")
-    name = "Sill" if name == "Door" else name
+def check_clear(blender: Blender, name: str) -> None:
+    """Check that a curve keeps its distance from the door."""
     gap = blender.do(f"value = helper.gap({name!r}, 'Door')")
-    print(f"   distance {gap:.3f}")
-    check(gap > 0.99 * CLEARANCE, f"the sill keeps the clearance ({gap:.4f})")
+    print(f"   {name} is {gap:.3f} away from the door")
+    check(gap > 0.99 * CLEARANCE, f"{name} keeps the clearance ({gap:.4f})")

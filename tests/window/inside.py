@@ -447,6 +447,12 @@ class Helper:
         shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
         return shown and [len(shown.courses), shown.chosen]
 
+    @staticmethod
+    def chosen_course():
+        """Points of the course that is chosen in the preview."""
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        return shown.lines[shown.chosen].tolist()
+
     @classmethod
     def another_course(cls):
         """A course that is not chosen, and a pixel of the screen where a click chooses it.
