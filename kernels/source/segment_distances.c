@@ -165,8 +165,8 @@ static int least_distance(const Mesh *mesh, const Propagation *work, int64_t sid
     return OK;
 }
 
-/* Whether a straight path to an end of a window runs along the edge and reaches it from outside of the
-   window. Then no path leads through the window; this one continues at a vertex. */
+/* Whether a straight path to an end of a window runs along the edge and reaches it from outside of
+   the window. Then no path leads through the window; this one continues at a vertex. */
 static int is_grazed(const Window *window, double scale)
 {
     Vector low = {window->low, 0.0}, high = {window->high, 0.0};

@@ -635,6 +635,7 @@ def symmetry(blender: Blender) -> None:
     undo_and_redo(blender, states, "of a symmetric curve")
 
     step("Where the curve crosses the plane, the mark and the point snap to it")
+    blender.do("helper.look(0.15, -1.0, -0.6)")  # the chin from below
     on_plane = "min(helper.line(), key=lambda place: (place[2] > 0.0, abs(place[0])))"
     (chin,) = blender.do(f"value = helper.pixels([{on_plane}])")
     beside = chin[0] + 4, chin[1]
@@ -644,6 +645,7 @@ def symmetry(blender: Blender) -> None:
     blender.click(beside)
     count_points(blender, 4)
     check(abs(blender.do("value = helper.places()[3][0]")) < 1e-5, "a point on the plane")
+    blender.do("helper.look()")
     check_symmetric(blender)
     time.sleep(0.6)
 
