@@ -165,27 +165,29 @@ static int least_distance(const Mesh *mesh, const Propagation *work, int64_t sid
     return OK;
 }
 
-/* Whether a segment lies in the line of an edge, beside the window on it. Its straight paths run
-   along the edge and continue at the vertices; none leads through the window. Rounding bends the
-   line at the vertices, and without this test such paths would turn around them. */
+/* Whether a straight path to an end of a window runs along the edge and reaches it from outside of
+   the window. Then no path leads through the window; this one continues at a vertex. */
 static int is_grazed(const Window *window, double scale)
 {
-    double left = lesser(window->start.x, window->end.x);
-    double right = greater(window->start.x, window->end.x);
-    return lesser(window->start.y, window->end.y) >= -scale &&
-           (left > window->high + scale || right < window->low - scale);
+    Vector low = {window->low, 0.0}, high = {window->high, 0.0};
+    Vector to_low = nearest_on(window->start, window->end, low);
+    Vector to_high = nearest_on(window->start, window->end, high);
+    return (to_low.y >= -scale && to_low.x < low.x - scale) ||
+           (to_high.y >= -scale && to_high.x > high.x + scale);
 }
 
-/* The part of a segment with y >= 0. From the rest, no line leads through an edge on the x axis. */
-static void clip_behind(Vector start, Vector end, Vector *first, Vector *last)
+/* Leaves the part of a segment with y <= 0, up to rounding. Returns whether there is one. */
+static int cut_at_edge(Vector *start, Vector *end, double scale)
 {
-    double rise = end.y - start.y;
-    *first = start;
-    *last = end;
-    if (start.y < 0.0 && end.y > 0.0) first->x -= start.y * (end.x - start.x) / rise;
-    if (end.y < 0.0 && start.y > 0.0) last->x -= end.y * (end.x - start.x) / rise;
-    first->y = greater(start.y, 0.0);
-    last->y = greater(end.y, 0.0);
+    Vector *higher = start->y > end->y ? start : end, *lower = higher == start ? end : start;
+    if (lower->y > scale) return 0;
+    if (higher->y > scale) {
+        double share = lower->y < 0.0 ? lower->y / (lower->y - higher->y) : 0.0;
+        higher->x = lower->x + share * (higher->x - lower->x);
+    }
+    higher->y = lesser(higher->y, 0.0);
+    lower->y = lesser(lower->y, 0.0);
+    return 1;
 }
 
 /* Adds a window on a side of a face, given in the plane of this face, which has y > 0. Nothing is
@@ -200,11 +202,9 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
     TRY(ends_of(mesh, beyond, &first_beyond, &second));
     int is_turned = first != first_beyond;
     double sign = is_turned ? -1.0 : 1.0, shift = is_turned ? length : 0.0;
-    Vector start, end;
-    clip_behind(given->start, given->end, &start, &end);
     Window window = {
-        {shift + sign * start.x, -start.y},
-        {shift + sign * end.x, -end.y},
+        {shift + sign * given->start.x, -given->start.y},
+        {shift + sign * given->end.x, -given->end.y},
         given->before,
         greater(is_turned ? length - given->high : given->low, 0.0),
         lesser(is_turned ? length - given->low : given->high, length),
@@ -218,6 +218,7 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
     window.at_high.x = sign * at_high.x;
     window.at_high.y = -at_high.y;
     if (!(window.high - window.low > work->scale)) return OK;
+    if (!cut_at_edge(&window.start, &window.end, work->scale)) return OK;
     if (is_grazed(&window, work->scale)) return OK;
     double least;
     TRY(least_distance(mesh, work, beyond, &window, &least));
@@ -275,9 +276,10 @@ static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, c
         return OK;
     for (int i = 0; i < 2; i++) {
         values[0][i] = sign * cross_of(along, way(start, corners[i]));
-        if (values[0][i] >= -work->scale) values[0][i] = greater(values[0][i], 0.0);
         values[1][i] = sign * cross_of(way(start, corners[i]), lines[0]);
         values[2][i] = sign * cross_of(lines[1], way(end, corners[i]));
+        for (int k = 0; k < 3; k++)
+            if (values[k][i] >= -work->scale) values[k][i] = greater(values[k][i], 0.0);
     }
     for (int k = 0; k < 3; k++) clip(values[k][0], values[k][1], &low, &high);
     if (!(low < high)) return OK;

@@ -20,8 +20,9 @@ AT_JUNCTION = 1e-9
 """Distance up to which a point is a junction, in bounding-box diagonals."""
 
 SNAP = 1e-5
-"""Distance, in edges, up to which cuts move to vertices; libigl needs far too much memory on thinner
-triangles."""
+"""Distance, in edges, up to which cuts move to vertices.
+
+On thinner triangles, libigl needs far too much memory."""
 
 
 def contacts(

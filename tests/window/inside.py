@@ -17,6 +17,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import bodies  # noqa: E402
+
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 EXTENSION = "bl_ext.user_default.nicmm_curves"
 MODULE, CORE = f"{EXTENSION}.nicmm_blender", f"{EXTENSION}.nicmm_core"
@@ -262,13 +266,50 @@ class Helper:
         found = [monkey.ray_cast((x, -5.0, z), (0.0, 1.0, 0.0), depsgraph=graph) for x, z in pairs]
         return [list(location) for _hit, location, _normal, _face in found]
 
+    @classmethod
+    def seen(cls, places, name):
+        """Points of the shown surface of an object that hide given places, or are in front."""
+        graph = bpy.context.evaluated_depsgraph_get()
+        body = bpy.data.objects[name]
+        to_local = body.matrix_world.inverted()
+        eye = to_local @ cls.area().spaces.active.region_3d.view_matrix.inverted().translation
+        found = [body.ray_cast(eye, _vector(place) - eye, depsgraph=graph) for place in places]
+        if not all(hit for hit, _location, _normal, _face in found):
+            raise ValueError(f"nothing is seen at one of {places}")
+        return [list(location) for _hit, location, _normal, _face in found]
+
     @staticmethod
-    def away():
-        """Greatest distance of the curve from the shown surface, in diagonals."""
+    def gap(name, other):
+        """Least distance between the points of a curve and another curve, in local units."""
+        from mathutils.geometry import intersect_point_line
+
+        points, ends = (
+            [
+                point.co.xyz
+                for spline in bpy.data.objects[each].data.splines
+                for point in [*spline.points, *spline.points[: spline.use_cyclic_u]]
+            ]
+            for each in (name, other)
+        )
+
+        def away(place, start, end):
+            nearest, along = intersect_point_line(place, start, end)
+            return (place - (nearest if 0.0 <= along <= 1.0 else (start, end)[along > 0.5])).length
+
+        pairs = list(zip(ends[:-1], ends[1:], strict=True))
+        return min(away(place, *pair) for place in points for pair in pairs)
+
+    @staticmethod
+    def away(name="Suzanne", curve_name=None):
+        """Greatest distance of a curve, by default the first, from the surface, in diagonals."""
         from mathutils.bvhtree import BVHTree
 
-        monkey = bpy.data.objects["Suzanne"]
-        curve = next(found for found in bpy.data.objects if found.type == "CURVE")
+        monkey = bpy.data.objects[name]
+        curve = (
+            bpy.data.objects[curve_name]
+            if curve_name
+            else next(found for found in bpy.data.objects if found.type == "CURVE")
+        )
         if monkey.mode == "SCULPT" and not any(each.show_viewport for each in monkey.modifiers):
             mesh = monkey.data
         else:
@@ -363,14 +404,14 @@ class Helper:
         return line[seen[np.abs(seen - len(line) // 2).argmin()]].tolist()
 
     @classmethod
-    def middle_of_other(cls, name, leg):
-        """A point of a leg of a curve that is not active, near its middle."""
+    def middle_of_other(cls, name, leg, share=0.5):
+        """A point of a leg of a curve that is not active, by default near its middle."""
         record = import_module(f"{MODULE}.scene.curve_record")
         curve = bpy.data.objects[name]
         surface = record.surface_of(curve, record.mesh_of(curve))
         (found,) = record.read_curves(curve, surface)
         index = import_module(f"{CORE}.geometry.curve").points_of_leg(found, leg)
-        return found.points[index[len(index) // 2]].tolist()
+        return found.points[index[int(share * len(index))]].tolist()
 
     @classmethod
     def junctions(cls, curve=None):
@@ -405,6 +446,12 @@ class Helper:
         """The number of courses among which the user chooses, and the chosen one; or None."""
         shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
         return shown and [len(shown.courses), shown.chosen]
+
+    @staticmethod
+    def chosen_course():
+        """Points of the course that is chosen in the preview."""
+        shown = import_module(f"{MODULE}.tool.course_overlay")._state.shown
+        return shown.lines[shown.chosen].tolist()
 
     @classmethod
     def another_course(cls):
@@ -483,7 +530,13 @@ def watch_tool():
 def answer():
     """Execute the next command, if there is one."""
     for command in sorted(FOLDER.glob("*.command")):
-        scope = {"bpy": bpy, "np": np, "helper": Helper, "watch_tool": watch_tool}
+        scope = {
+            "bpy": bpy,
+            "np": np,
+            "bodies": bodies,
+            "helper": Helper,
+            "watch_tool": watch_tool,
+        }
         try:
             exec(command.read_text(), scope)
             reply = json.dumps({"value": scope.get("value")})

@@ -19,7 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from drive import Blender, check, install, step  # noqa: E402
+from screen import Blender, check, install, step  # noqa: E402
 
 PLACES = ((-0.3, 0.65), (0.3, 0.65), (0.12, -0.6), (-0.12, -0.6))
 """Sideways and upwards on the front of Suzanne's head."""

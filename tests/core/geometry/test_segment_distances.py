@@ -206,3 +206,19 @@ def test_paths_along_a_line_of_edges_do_not_turn_at_its_vertices(share):
         near = expected < 2.9
         assert 30 < near.sum()
         np.testing.assert_allclose(found[near], expected[near], rtol=1e-12, atol=1e-12)
+
+
+def test_a_segment_on_an_edge_is_as_near_as_its_points(surface):
+    generator = np.random.default_rng(7)
+    for face in generator.choice(len(surface.faces), 20, replace=False).tolist():
+        ends = generator.random((2, 1)) * [[1.0, -1.0, 0.0]] + [[0.0, 1.0, 0.0]]
+        start, end = np.roll(ends, face % 3, axis=1)[:, None]
+        shares = np.linspace(0.0, 1.0, 9)[:, None]
+        points = (1.0 - shares) * start + shares * end
+        whole = FaceSegments(np.array([face]), start, end)
+        parts = FaceSegments(np.full(9, face), points, points)
+        found = SegmentDistances(surface, whole, 0.3).at_vertices
+        bound = SegmentDistances(surface, parts, 0.3).at_vertices
+        near = bound < 0.3 * (1.0 - 1e-9)
+        assert near.any()
+        assert (found[near] <= bound[near] + 1e-9).all()
