@@ -22,7 +22,7 @@ from .evidence import Results
 from .scale import Scale
 
 TITLE = "Several curves on one mesh"
-WITHOUT = ("outputs",)
+WITHOUT = ("paper",)
 
 SEED = 46
 
