@@ -44,7 +44,7 @@ NEAR = (0.08, 0.4)
 MOVED = 0.05
 """Distance by which a control point of the first curve is moved at most, in lengths of it."""
 
-DRAWS = 20
+DRAWS = 40
 """Number of sets of points that are tried for each curve; some are separated by other curves."""
 
 

@@ -34,6 +34,7 @@ from .avoidance.avoided_curve import Avoided, avoided_curves
 from .avoidance.contacts import is_too_close, meeting_only_at_junctions, meets
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
+from .displaced_start import UNEVEN
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of
@@ -51,6 +52,7 @@ from .geometry.surface_points import (
 from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
+from .relaxation.curve_energies import scaled_bending
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
@@ -64,6 +66,7 @@ from .repaired_surface import (
     start_on,
 )
 from .request import Request, same_request
+from .start import WITHOUT_START
 from .status import Status
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
@@ -197,6 +200,8 @@ class Designer:
                         avoided = avoided_curves(self.mesh, request.avoid, request.points)
                         clearance = request.clearance
                         design = _off_avoided(self.mesh, design, avoided, clearance)
+                        if isinstance(start, Design) and max_iterations is None:
+                            _check_even(start, design)
                     return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
@@ -403,6 +408,15 @@ class Designer:
         if last is None or not last.is_of(surface, avoided, request.clearance):
             last = self._off_curves = SurfaceOffCurves(surface, avoided, request.clearance)
         return last
+
+
+def _check_even(start: Design, design: Design) -> None:
+    """Raise CurveError if a curve beside avoided ones bends far more than its start."""
+    before, after = start.resumable, design.resumable
+    if before is None or after is None:
+        return
+    if scaled_bending(after.curve) - scaled_bending(before.curve) > UNEVEN:
+        raise CurveError(f"start would become uneven beside the curves of avoid{WITHOUT_START}")
 
 
 def _off_avoided(mesh: Mesh, design: Design, avoided: list[Avoided], clearance: float) -> Design:

@@ -1,7 +1,8 @@
 """Moves a start that leaves the surface of a request to the nearest places on it.
 
 When a curve that is avoided changes, the curves that avoid it may come too close to it. They keep
-their courses where a small displacement mends that.
+their courses where a small displacement mends that. Beside a bent line at the clearance, where the
+nodes of a curve hardly move, it may remain uneven; then a new curve is fairer.
 """
 
 from __future__ import annotations
@@ -17,6 +18,10 @@ from .relaxation.warm_start import LONGEST_MOVE
 
 NODES = 256
 """Number of points of a curve that are moved."""
+
+UNEVEN = 8.0
+"""Increase of L ∮ κ_g² ds above which a curve has become uneven, a fifth of the value of a circle.
+"""
 
 FEWEST_NODES = 4
 """Least number of them on a leg, without its end."""
