@@ -169,6 +169,13 @@ def change_points(blender: Blender) -> None:
     time.sleep(2.0)
     check(state(blender) == before, "nothing changes")
     blender.shot("5-problem")
+    close_message(blender)
+
+
+def close_message(blender: Blender) -> None:
+    """Close the message of an operator, which the next click would only close as well."""
+    blender.key("Escape")
+    time.sleep(0.5)
 
 
 def report_moves(blender: Blender) -> None:
@@ -561,8 +568,7 @@ def courses(blender: Blender) -> None:
     blender.key("ctrl+shift+Return")
     time.sleep(1.0)
     check(not blender.do("value = helper.is_modal()"), "beside the curve there is no choice")
-    blender.key("Escape")  # the message covers the view, and the next click would only close it
-    time.sleep(0.5)
+    close_message(blender)
 
 
 def via_points(blender: Blender) -> None:
