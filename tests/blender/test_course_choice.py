@@ -44,6 +44,8 @@ def choice(empty_scene, monkeypatch):
         return view(matrices(-5.0, True), SIZE, surface, cache.core_mesh(surface), True)
 
     monkeypatch.setattr(picking, "view_on", seen_from_the_front)
+    # Without time slices, for which a window would be needed on a slow machine.
+    monkeypatch.setattr(module(empty_scene, "preferences"), "patience", lambda: 3600.0)
 
     class Operator(course_choice.CourseChoice):
         bl_label, curve, leg, under_mouse = "Choose Course", "", -1, False
