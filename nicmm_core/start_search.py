@@ -122,7 +122,7 @@ class StartSearch:
     ) -> Iterator[InitialCurve]:
         """A start with courses of its new legs; the best of each leg come first.
 
-        There are none if no leg is new.
+        The iterator is empty if no leg is new.
 
         Parameters
         ----------

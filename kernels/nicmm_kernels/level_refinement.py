@@ -65,8 +65,8 @@ class PartArrays(NamedTuple):
     faces : (f, 3) int array
         Vertices of each triangle.
     opposite : (3 f,) int array
-        For side 3 i + j the same edge as a side of the adjacent triangle; the side itself if there
-        is none.
+        For side 3 i + j the same edge as a side of the adjacent triangle; the side itself at a
+        boundary.
     parents : (f,) int array
         The face of the mesh that contains each triangle.
     corners : (f, 3, 3) float array

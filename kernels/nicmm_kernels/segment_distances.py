@@ -87,7 +87,7 @@ class SegmentPaths:
         Barycentric coordinates of their ends.
     previous, following : (s,) int arrays
         The segment that ends where each one begins, and the one that begins where it ends; -1 if
-        there is none or if that is unknown.
+        no segment does or if that is unknown.
     limit : float
         Distance up to which paths are followed, in mesh units.
     scale : float

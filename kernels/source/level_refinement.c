@@ -48,7 +48,7 @@ static int part_corner(const Refinement *parts, int64_t corner, int64_t *vertex)
     return OK;
 }
 
-/* The longest side of a triangle that may be bisected, -1 if there is none. Of sides of equal
+/* The longest side of a triangle that may be bisected, -1 if all sides stay. Of sides of equal
    length, it is the same one in both triangles. */
 static int longest_side(const Refinement *parts, int64_t face, int64_t *side, double *length)
 {

@@ -21,7 +21,7 @@ Blender stores the positions of vertices in single precision.
 
 
 def asymmetry_text(scene: bpy.types.Scene, surface: Surface, design: Design) -> str:
-    """The asymmetry in units of the scene, such as "; asymmetry 0.3 mm"; empty if there is none."""
+    """The asymmetry in units of the scene, such as "; asymmetry 0.3 mm"; empty without one."""
     diagonal = float(np.linalg.norm(np.ptp(surface.core_positions, axis=0)))
     if design.asymmetry is None or design.asymmetry <= SYMMETRIC * diagonal:
         return ""

@@ -235,7 +235,7 @@ def _curves_to_store(surface: Surface, curves: list[SurfaceCurve]) -> dict[str, 
 
 
 def _via_points_to_store(surface: Surface, via: ViaPoints | None) -> dict[str, list[float]]:
-    """Via points as a record stores them; nothing if there are none."""
+    """Via points as a record stores them; an empty dict without any."""
     if via is None or not len(via):
         return {}
     points = _points_to_store(VIA, surface, via.points.faces, via.points.barycentric)
@@ -264,7 +264,7 @@ def _control_points_of(curves: list[SurfaceCurve]) -> SurfacePoints:
 def _junctions_to_store(
     surface: Surface, points: SurfacePoints, others: Sequence[OtherCurve]
 ) -> dict[str, list[dict[str, Any]]]:
-    """The control points on other curves as a record stores them; nothing if there are none."""
+    """Control points on other curves as a record stores them; an empty dict without any."""
     if not others:
         return {}
     found = junctions.on_curves(surface_cache.core_mesh(surface), points, others)

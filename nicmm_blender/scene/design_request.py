@@ -177,7 +177,7 @@ def resolved(requests: Sequence[DesignRequest], answers: Sequence[Answer]) -> li
 
 
 def new_curves(request: DesignRequest, answer: Answer) -> NewCurves:
-    """The curves in the answer to a request for an existing object; empty if there are none."""
+    """The curves in the answer to a request for an existing object; possibly empty."""
     if not request.curve_uid or isinstance(answer, Exception) or not answer.curves:
         return {}
     return {request.curve_uid: tuple(answer.curves)}

@@ -211,7 +211,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
 
 def _design(context: bpy.types.Context, opened: Opened, points: ControlPoints) -> "Design":
-    """The design of the curve through points; an error if there is none."""
+    """The design of the curve through points; an error if it has no curve."""
     requests = edited_curve.request(opened, points)
     if not requests:
         raise InputError(TOO_FEW_POINTS)

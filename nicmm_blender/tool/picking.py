@@ -253,7 +253,7 @@ def _hit(
 def junction_at(
     context: bpy.types.Context, view: View, pixel: np.ndarray, opened: Opened
 ) -> SurfacePoints | None:
-    """The point of a curve that the given one avoids near a pixel; None if there is none.
+    """The point of a curve that the given one avoids near a pixel, or None.
 
     Control points of that curve are preferred to other points of it.
     """
