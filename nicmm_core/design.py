@@ -34,7 +34,7 @@ from .avoidance.avoided_curve import Avoided, avoided_curves
 from .avoidance.contacts import is_too_close, meeting_only_at_junctions, meets
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
-from .displaced_start import UNEVEN
+from .displaced_start import is_uneven
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of
@@ -52,7 +52,6 @@ from .geometry.surface_points import (
 from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
-from .relaxation.curve_energies import scaled_bending
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
@@ -413,9 +412,7 @@ class Designer:
 def _check_even(start: Design, design: Design) -> None:
     """Raise CurveError if a curve beside avoided ones bends far more than its start."""
     before, after = start.resumable, design.resumable
-    if before is None or after is None:
-        return
-    if scaled_bending(after.curve) - scaled_bending(before.curve) > UNEVEN:
+    if before is not None and after is not None and is_uneven(before.curve, after.curve):
         raise CurveError(f"start would become uneven beside the curves of avoid{WITHOUT_START}")
 
 

@@ -12,7 +12,9 @@ import numpy as np
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.surface_points import nearest_points
+from .relaxation.curve_energies import scaled_bending
 from .relaxation.curve_nodes import CurveSurface
+from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
 from .relaxation.warm_start import LONGEST_MOVE
 
@@ -54,6 +56,11 @@ def displaced(
         return None
     moved = simple_curve(surface, places, control_nodes, places[control_nodes], closed)
     return None if moved is None else moved.surface_curve(surface.mesh)
+
+
+def is_uneven(before: DiscreteCurve, after: DiscreteCurve) -> bool:
+    """Whether a curve bends far more than the one from which it was continued."""
+    return scaled_bending(after) - scaled_bending(before) > UNEVEN
 
 
 def _nodes(

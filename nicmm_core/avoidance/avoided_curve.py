@@ -11,6 +11,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
+from ..geometry.curve_places import nearest_segment
 from ..geometry.mesh import Mesh
 from ..geometry.segment_distances import FaceSegments
 from ..geometry.surface_points import SurfacePoints
@@ -119,17 +120,13 @@ def avoided_curves(
 def _avoided_curve(mesh: Mesh, curve: SurfaceCurve, points: SurfacePoints) -> Avoided:
     curve, segment_faces = checked_curve(mesh, curve, across_gaps=True)
     found = Avoided(curve, segment_faces, np.zeros(0))
-    start = curve.points if curve.closed else curve.points[:-1]
-    squared = np.maximum((curve.steps**2).sum(axis=1), tolerances.TINY)
     within = tolerances.COINCIDENT * mesh.diagonal
     junctions = []
     for position in points.positions(mesh):
-        share = (((position - start) * curve.steps).sum(axis=1) / squared).clip(0.0, 1.0)
-        away = np.linalg.norm(start + share[:, None] * curve.steps - position, axis=1)
-        nearest = int(away.argmin())
-        if away[nearest] <= within:
-            arcs = found.arcs[nearest : nearest + 2]
-            junctions.append((1.0 - share[nearest]) * arcs[0] + share[nearest] * arcs[1])
+        segment, share, away = nearest_segment(curve, position)
+        if away <= within:
+            arcs = found.arcs[segment : segment + 2]
+            junctions.append((1.0 - share) * arcs[0] + share * arcs[1])
     return replace(found, junctions=np.array(junctions))
 
 

@@ -72,7 +72,7 @@ def point_at(mesh: Mesh, curve: SurfaceCurve, place: CurvePlace) -> SurfacePoint
 
 def distances(curve: SurfaceCurve, positions: FloatArray) -> FloatArray:
     """Distance of positions (k, 3) from a curve in space, (k,)."""
-    return np.array([_nearest(curve, position)[2] for position in positions])
+    return np.array([nearest_segment(curve, position)[2] for position in positions])
 
 
 def nearest_point(
@@ -93,7 +93,7 @@ def nearest_point(
         One point.
     float
     """
-    segment, share, _ = _nearest(curve, position)
+    segment, share, _ = nearest_segment(curve, position)
     point = _on_segment(mesh, curve, segment, share)
     return point, float(np.linalg.norm(point.positions(mesh)[0] - position))
 
@@ -114,7 +114,7 @@ def nearest_place(mesh: Mesh, curve: SurfaceCurve, position: FloatArray) -> Curv
     control, last = int(away.argmin()), number_of_legs(curve)
     if away[control] <= COINCIDENT * mesh.diagonal:
         return CurvePlace(control, 0.0) if control < last else CurvePlace(control - 1, 1.0)
-    segment, share, _ = _nearest(curve, position)
+    segment, share, _ = nearest_segment(curve, position)
     leg = leg_of_segment(curve, segment)
     arcs, index = _arcs(curve, leg), points_of_leg(curve, leg)
     number = int(np.flatnonzero(index[:-1] == segment)[0])
@@ -128,7 +128,7 @@ def _arcs(curve: SurfaceCurve, leg: int) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
 
 
-def _nearest(curve: SurfaceCurve, position: FloatArray) -> tuple[int, float, float]:
+def nearest_segment(curve: SurfaceCurve, position: FloatArray) -> tuple[int, float, float]:
     """The segment of a curve nearest to a position, the fraction along it, and the distance."""
     step = curve.steps
     start = curve.points[: len(step)]
