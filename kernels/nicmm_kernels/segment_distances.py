@@ -79,8 +79,7 @@ class SegmentPaths:
     Parameters
     ----------
     mesh : MeshArrays
-        Meshes of which two faces share more than an edge, or three an edge, have no opposite sides
-        there, and paths end.
+        Paths end where a side has no opposite one.
     faces : (s,) int array
         Faces of the segments.
     starts, ends : (s, 3) float arrays

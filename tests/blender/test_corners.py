@@ -13,7 +13,7 @@ from mathutils.bvhtree import BVHTree
 
 from tests.blender import scenes
 from tests.blender.scenes import module
-from tests.blender.test_point_operators import call, content, refusal
+from tests.blender.test_point_operators import call, content, refusal, undo_and_redo
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
@@ -227,12 +227,7 @@ def test_toggling_is_one_undo_step(plane):
     curve = bpy.data.objects[name]
     assert corners(curve) == [1, 1, 1, 1]
     assert off_square(scenes.points(curve)) < STRAIGHT
-    for expected in states[-2::-1]:
-        bpy.ops.ed.undo()
-        assert content() == expected
-    for expected in states[1:]:
-        bpy.ops.ed.redo()
-        assert content() == expected
+    undo_and_redo(states)
     call("toggle_corner", index=1)
     assert corners(bpy.data.objects[name]) == [1, 0, 1, 1]
 

@@ -48,6 +48,16 @@ def content():
     return found
 
 
+def undo_and_redo(states):
+    """Each undo leads to the content before it, and each redo to that after it."""
+    for expected in states[-2::-1]:
+        bpy.ops.ed.undo()
+        assert content() == expected
+    for expected in states[1:]:
+        bpy.ops.ed.redo()
+        assert content() == expected
+
+
 def controls(curve):
     return np.array(curve["nicmm_curve"]["control_positions"]).reshape(-1, 3)
 

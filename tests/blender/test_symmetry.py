@@ -13,7 +13,7 @@ from mathutils import Euler
 from tests.blender import scenes
 from tests.blender.scenes import module
 from tests.blender.test_curve_list import run_timer
-from tests.blender.test_point_operators import call, content, controls, refusal
+from tests.blender.test_point_operators import call, content, controls, refusal, undo_and_redo
 from tests.blender.test_view import looking
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
@@ -404,12 +404,7 @@ def test_each_change_is_one_undo_step(pair, sphere):
     ):
         call(name, **arguments)
         states.append(content())
-    for expected in states[-2::-1]:
-        bpy.ops.ed.undo()
-        assert content() == expected
-    for expected in states[1:]:
-        bpy.ops.ed.redo()
-        assert content() == expected
+    undo_and_redo(states)
 
 
 def test_via_points(joined, sphere):

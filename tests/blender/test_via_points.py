@@ -7,7 +7,7 @@ import pytest
 from tests.blender import scenes
 from tests.blender.scenes import module
 from tests.blender.test_next_course import APART, away, diagonal, line, torus
-from tests.blender.test_point_operators import call, content, controls, refusal
+from tests.blender.test_point_operators import call, content, controls, refusal, undo_and_redo
 
 pytestmark = [pytest.mark.usefixtures("remembered_designs"), pytest.mark.slow]
 
@@ -79,12 +79,7 @@ def test_each_is_one_undo_step(torus, curve):
     states.append(content())
     call("remove_via_point", index=0)
     states.append(content())
-    for expected in states[-2::-1]:
-        bpy.ops.ed.undo()
-        assert content() == expected
-    for expected in states[1:]:
-        bpy.ops.ed.redo()
-        assert content() == expected
+    undo_and_redo(states)
 
 
 def test_dragging_a_control_point_keeps_course_and_via_points(torus, curve):
