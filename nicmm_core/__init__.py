@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .design import Designer as Designer
     from .design import design_curve as design_curve
     from .design import mirrored as mirrored
+    from .design import offset_curve as offset_curve
     from .design_result import Design as Design
     from .errors import ArgumentError as ArgumentError
     from .errors import ControlPointError as ControlPointError
@@ -42,6 +43,7 @@ _NAMES = {
         "Designer",
         "design_curve",
         "mirrored",
+        "offset_curve",
     ),
     "design_result": ("Design",),
     "errors": (

@@ -97,16 +97,24 @@ def _checked_curves(mesh: Mesh, name: str, value: Any) -> tuple[SurfaceCurve, ..
         )
     found = []
     for number, given in enumerate(value):
-        if not isinstance(given, SurfaceCurve):
-            raise ArgumentError(
-                f"{name}[{number}] is {given!r}; pass a SurfaceCurve, or a Design with exactly "
-                "one curve"
-            )
-        found.append(_checked_curve(mesh, f"{name}[{number}]", given))
+        found.append(checked_surface_curve(mesh, f"{name}[{number}]", given))
     return tuple(found) or None
 
 
-def _checked_curve(mesh: Mesh, name: str, given: SurfaceCurve) -> SurfaceCurve:
+def checked_surface_curve(mesh: Mesh, name: str, given: Any) -> SurfaceCurve:
+    """Check that a curve lies on a mesh.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no curve.
+    CurveError
+        If it lies elsewhere.
+    """
+    if not isinstance(given, SurfaceCurve):
+        raise ArgumentError(
+            f"{name} is {given!r}; pass a SurfaceCurve, or a Design with exactly one curve"
+        )
     try:
         curve, _ = checked_curve(mesh, given, across_gaps=True)
     except CurveError as error:

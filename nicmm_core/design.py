@@ -29,7 +29,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_iterations, checked_corners, checked_options
+from .arguments import (
+    check_iterations,
+    checked_corners,
+    checked_options,
+    checked_surface_curve,
+)
 from .avoidance.avoided_curve import Avoided, avoided_curves
 from .avoidance.contacts import is_too_close, meeting_only_at_junctions, meets
 from .blas_threads import single_blas_thread
@@ -49,6 +54,7 @@ from .geometry.surface_points import (
     nearest_points,
     snapped,
 )
+from .offsets.curve_offsets import checked_distances, offset_curves
 from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
@@ -284,7 +290,9 @@ class Designer:
                     )
             if not options["clearance"]:
                 return
-            mapped, there = self._curve_on_manifold(curve)
+            mapped, there = self._curve_on_manifold(
+                curve, "design", "the clearance is measured there, so leave clearance out"
+            )
             for number, each in enumerate(avoided):
                 if is_too_close(mapped, there, each, options["clearance"]):
                     raise UnreachableError(
@@ -292,22 +300,47 @@ class Designer:
                         f"({clearance:g}); move control points away from it, or use a smaller one"
                     )
 
-    def _curve_on_manifold(self, curve: SurfaceCurve) -> tuple[MappedMesh, SurfaceCurve]:
-        """The first manifold of the whole surface that has a curve of design, and the curve on it.
+    def offset_curves(
+        self, curve: SurfaceCurve | Design, distances: Sequence[ArrayLike]
+    ) -> list[list[SurfaceCurve]]:
+        """Offsets of a curve at several distances, as `offset_curve` computes each of them.
+
+        Parameters
+        ----------
+        curve : SurfaceCurve or Design
+            A curve on this mesh, or a design with one.
+        distances : sequence of float or (k,) float array_like
+            Distances along the surface, positive for the left side.
+
+        Returns
+        -------
+        list of list of SurfaceCurve
+            The curves at each distance.
+        """
+        given = only_curve(curve, "curve") if isinstance(curve, Design) else curve
+        checked = checked_surface_curve(self.mesh, "curve", given)
+        widths = checked_distances(checked, distances)
+        with self._exclusive():
+            mapped, there = self._curve_on_manifold(
+                checked, "curve", "offsets are computed there, so design a curve elsewhere"
+            )
+            return offset_curves(mapped, there, widths)
+
+    def _curve_on_manifold(
+        self, curve: SurfaceCurve, name: str, consequence: str
+    ) -> tuple[MappedMesh, SurfaceCurve]:
+        """The first manifold of the whole surface that has a curve, and the curve on it.
 
         Raises
         ------
         CurveError
-            If no manifold has it.
+            If no manifold has it. The message names the argument, and what follows.
         """
         for mapped in self._whole.manifolds():
             there = mapped.curve_to(curve) if mapped.differs else curve
             if there is not None:
                 return mapped, there
-        raise CurveError(
-            "design cannot be mapped to a manifold, on which the clearance is measured; leave "
-            "clearance out"
-        )
+        raise CurveError(f"{name} cannot be mapped to a manifold; {consequence}")
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:
@@ -627,3 +660,51 @@ def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
     1
     """
     return Designer(mesh).mirrored(design, plane)
+
+
+def offset_curve(
+    mesh: Mesh, curve: SurfaceCurve | Design, distance: ArrayLike
+) -> list[SurfaceCurve]:
+    """Curves at a distance from a curve along the surface, on one side of it.
+
+    They consist of all points at the distance whose shortest path to the curve begins on that side.
+    So they split and merge as the lines of a distance field do, and those of an open curve end
+    beside its ends. They have the direction of the curve.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    curve : SurfaceCurve or Design
+        A curve on this mesh, or a design with one.
+    distance : float or (k,) float array_like
+        Distance along the surface in mesh units: positive for the left side of the curve, seen
+        with the normals of the faces upwards, negative for the right side. With one value for each
+        of its control points, in the order visited, the distance varies linearly with the arc
+        length in between. All values have the same sign.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        The curves, the longest first, without control points. It is empty if no point on that side
+        is so far away.
+
+    Raises
+    ------
+    CurveError
+        If the curve does not lie on the mesh, or the surface has only one side.
+    ArgumentError
+        If the distance cannot be used.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(3)
+    >>> curve = nicmm.design_curve(mesh, [12, 80, 41]).curves[0]
+    >>> [parallel] = nicmm.offset_curve(mesh, curve, 0.1)
+    >>> parallel.closed
+    True
+    """
+    designer = Designer(mesh)
+    (found,) = designer.offset_curves(curve, [distance])
+    return found

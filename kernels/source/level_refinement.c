@@ -132,9 +132,9 @@ static int bisect(const Mesh *mesh, const Propagation *found, Refinement *parts,
             0.5 * (parts->vertices[3 * first + i] + parts->vertices[3 * second + i]);
     parts->fixed[vertex] = 0;
     TRY(divide(parts, side, vertex));
-    TRY(distance_of_point(mesh, found, parts->parents[face],
-                          parts->corners + 9 * face + 3 * SECOND_END[own],
-                          parts->distances + vertex));
+    TRY(scaled_distance(mesh, found, parts->parents[face],
+                        parts->corners + 9 * face + 3 * SECOND_END[own],
+                        parts->distances + vertex));
     if (beyond == side) return OK;
     CHECK(beyond, 3 * added);
     int64_t added_beyond = parts->face_count;
@@ -184,7 +184,7 @@ static int is_accurate(const Mesh *mesh, const Propagation *found, const Refinem
         for (int i = 0; i < 3; i++)
             weights[i] = SHARES[k][0] * corners[i] + SHARES[k][1] * corners[3 + i] +
                          SHARES[k][2] * corners[6 + i];
-        TRY(distance_of_point(mesh, found, parts->parents[face], weights, &exact));
+        TRY(scaled_distance(mesh, found, parts->parents[face], weights, &exact));
         *result = fabs(dot(SHARES[k], at_corners) - exact) <= parts->error;
     }
     return OK;

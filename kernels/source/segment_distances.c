@@ -20,7 +20,10 @@
 static const double OVERLAP = 1.0 / 64.0;
 
 /* Cosine of the angle between segments below which their lines are not divided. */
-static const double SHARPEST = -0.5;
+static const double SHARPEST = -0.99;
+
+/* Cosine of the angle between segments below which the bend between them is sharp. */
+static const double SHARP = 0.5;
 
 /* Number of times that a side is halved to find the part of it that lines from a vertex reach. */
 enum { HALVINGS = 7 };
@@ -44,14 +47,24 @@ static double norm(Vector vector)
     return sqrt(vector.x * vector.x + vector.y * vector.y);
 }
 
-/* The nearest point of a segment. */
-static Vector nearest_on(Vector start, Vector end, Vector point)
+static Vector point_between(Vector start, Vector end, double share)
+{
+    Vector found = {start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)};
+    return found;
+}
+
+/* Position of the nearest point of a segment, as a fraction of its length. */
+static double nearest_share(Vector start, Vector end, Vector point)
 {
     Vector along = way(start, end), to = way(start, point);
     double squared = greater(along.x * along.x + along.y * along.y, TINY);
-    double share = lesser(greater((to.x * along.x + to.y * along.y) / squared, 0.0), 1.0);
-    Vector found = {start.x + share * along.x, start.y + share * along.y};
-    return found;
+    return lesser(greater((to.x * along.x + to.y * along.y) / squared, 0.0), 1.0);
+}
+
+/* The nearest point of a segment. */
+static Vector nearest_on(Vector start, Vector end, Vector point)
+{
+    return point_between(start, end, nearest_share(start, end, point));
 }
 
 /* A face in the plane, seen from one of its sides. */
@@ -97,14 +110,27 @@ static Vector point_in(const Plane *plane, int64_t own, const double *barycentri
     return found;
 }
 
-/* Distance of a point of the face beyond a window; infinite where it is not seen. */
-static double distance_if_seen(const Window *window, Vector point, double scale)
+/* The nearest place of a segment to a point in its plane. */
+static Nearest nearest_place(Vector start, Vector end, double before, double from, double to,
+                             double side, Vector point)
+{
+    double share = nearest_share(start, end, point);
+    Vector away = way(point_between(start, end, share), point);
+    Nearest found = {before + norm(away), (1.0 - share) * from + share * to, side};
+    return found;
+}
+
+/* The nearest place to a point of the face beyond a window; infinitely far if it is not seen. */
+static Nearest nearest_if_seen(const Window *window, Vector point, double scale)
 {
     Vector nearest = nearest_on(window->start, window->end, point), away = way(nearest, point);
     double crossing = point.x;
     if (away.y > 0.0) crossing = nearest.x - away.x * nearest.y / away.y;
-    if (crossing < window->low - scale || crossing > window->high + scale) return INFINITY;
-    return window->before + norm(away);
+    Nearest found = nearest_place(window->start, window->end, window->before, window->from,
+                                  window->to, window->side, point);
+    if (crossing < window->low - scale || crossing > window->high + scale)
+        found.distance = INFINITY;
+    return found;
 }
 
 /* The angle between two directions, in [0, pi]. */
@@ -114,29 +140,31 @@ static double angle_between(Vector one, Vector other)
 }
 
 /* Lowers the distance of the vertex at a corner. */
-static int lower(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
+static int lower(const Mesh *mesh, Propagation *work, int64_t corner, Nearest nearest,
                  double arrival)
 {
     int64_t vertex;
     TRY(vertex_at(mesh, corner, &vertex));
-    if (!(distance < work->distances[vertex] - work->scale)) return OK;
-    work->distances[vertex] = distance;
+    if (!(nearest.distance < work->distances[vertex] - work->scale)) return OK;
+    work->distances[vertex] = nearest.distance;
+    work->feet[vertex] = nearest.arc;
+    work->beside[vertex] = nearest.side;
     work->corners[vertex] = corner;
     work->arrivals[vertex] = arrival;
-    if (distance >= work->limit) return OK;
+    if (nearest.distance >= work->limit) return OK;
     Queue queue = {mesh->vertex_count + work->room, work->queued, work->costs, work->items,
                    work->places};
-    TRY(enqueue(&queue, vertex, distance));
+    TRY(enqueue(&queue, vertex, nearest.distance));
     work->queued = queue.count;
     return OK;
 }
 
 /* Lowers the distance of the corner opposite to a side by a straight path from a segment. */
 static int lower_apex(const Mesh *mesh, Propagation *work, int64_t side, Vector apex, Vector start,
-                      Vector end, double before)
+                      Vector end, Nearest nearest)
 {
     Vector path = way(apex, nearest_on(start, end, apex)), first = {-apex.x, -apex.y};
-    return lower(mesh, work, side, before + norm(path), angle_between(first, path));
+    return lower(mesh, work, side, nearest, angle_between(first, path));
 }
 
 static double distance_at(const Window *window, double x)
@@ -176,14 +204,20 @@ static int is_grazed(const Window *window, double scale)
            (to_high.y >= -scale && to_high.x > high.x + scale);
 }
 
-/* Leaves the part of a segment with y <= 0, up to rounding. Returns whether there is one. */
-static int cut_at_edge(Vector *start, Vector *end, double scale)
+/* Leaves the part of a window's segment with y <= 0, up to rounding. Returns whether there is
+   one. */
+static int cut_at_edge(Window *window, double scale)
 {
-    Vector *higher = start->y > end->y ? start : end, *lower = higher == start ? end : start;
+    int start_is_higher = window->start.y > window->end.y;
+    Vector *higher = start_is_higher ? &window->start : &window->end;
+    Vector *lower = start_is_higher ? &window->end : &window->start;
     if (lower->y > scale) return 0;
     if (higher->y > scale) {
         double share = lower->y < 0.0 ? lower->y / (lower->y - higher->y) : 0.0;
+        double *high_arc = start_is_higher ? &window->from : &window->to;
+        double low_arc = start_is_higher ? window->to : window->from;
         higher->x = lower->x + share * (higher->x - lower->x);
+        *high_arc = low_arc + share * (*high_arc - low_arc);
     }
     higher->y = lesser(higher->y, 0.0);
     lower->y = lesser(lower->y, 0.0);
@@ -206,6 +240,9 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
         {shift + sign * given->start.x, -given->start.y},
         {shift + sign * given->end.x, -given->end.y},
         given->before,
+        given->from,
+        given->to,
+        given->side,
         greater(is_turned ? length - given->high : given->low, 0.0),
         lesser(is_turned ? length - given->low : given->high, length),
         {0.0, 0.0},
@@ -218,7 +255,7 @@ static int add_window(const Mesh *mesh, Propagation *work, int64_t side, const W
     window.at_high.x = sign * at_high.x;
     window.at_high.y = -at_high.y;
     if (!(window.high - window.low > work->scale)) return OK;
-    if (!cut_at_edge(&window.start, &window.end, work->scale)) return OK;
+    if (!cut_at_edge(&window, work->scale)) return OK;
     if (is_grazed(&window, work->scale)) return OK;
     double least;
     TRY(least_distance(mesh, work, beyond, &window, &least));
@@ -261,11 +298,12 @@ static Vector line_through(const Window *window, double x, Vector line, double a
 
 /* Adds the window of the lines on one side of a segment through a side of its own face.
 
+   arcs : arc lengths at the start and at the end
    sign : 1 for the lines to the left of the segment, -1 for those to the right
    lines : directions of the outermost lines, at the start and at the end */
 static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, const Plane *plane,
-                            Vector start, Vector end, Vector along, double sign,
-                            const Vector lines[2])
+                            Vector start, Vector end, const double arcs[2], Vector along,
+                            double sign, const Vector lines[2])
 {
     Vector corners[2] = {{0.0, 0.0}, {plane->length, 0.0}};
     double values[3][2], low = 0.0, high = 1.0;
@@ -283,7 +321,8 @@ static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, c
     }
     for (int k = 0; k < 3; k++) clip(values[k][0], values[k][1], &low, &high);
     if (!(low < high)) return OK;
-    Window window = {start, end, 0.0, low * plane->length, high * plane->length, {0, 0}, {0, 0}};
+    Window window = {start, end, 0.0, arcs[0], arcs[1], sign, low * plane->length,
+                     high * plane->length, {0, 0}, {0, 0}};
     Vector at_low = {window.low, 0.0}, at_high = {window.high, 0.0};
     int low_at_end = norm(way(at_low, end)) < norm(way(at_low, start));
     int high_at_end = norm(way(at_high, end)) < norm(way(at_high, start));
@@ -337,33 +376,77 @@ static int unfolded_direction(const Mesh *mesh, const Propagation *work, int64_t
 
 /* The direction of the outermost line on one side of a segment at one of its ends.
 
-   outward : 1 at the end, -1 at the start */
-static Vector outermost(Vector along, Vector neighbour, double sign, double outward)
+   outward : 1 at the end, -1 at the start
+   is_at_vertex : whether the end is a vertex, at which lines in all directions begin */
+static Vector outermost(Vector along, Vector neighbour, double sign, double outward,
+                        int is_at_vertex)
 {
     Vector line = {outward * along.x, outward * along.y};
+    Vector perpendicular = {-sign * along.y, sign * along.x}, limit = perpendicular;
     double cosine = along.x * neighbour.x + along.y * neighbour.y;
-    double length = norm(neighbour);
-    if (length < 0.5 || cosine < SHARPEST) return line;
-    Vector mean = {along.x + neighbour.x, along.y + neighbour.y};
-    double size = norm(mean);
-    Vector bisector = {-sign * mean.y / size, sign * mean.x / size};
-    /* On the inner side of a bend, the lines themselves are perpendicular to the segment. */
-    if (outward * (bisector.x * along.x + bisector.y * along.y) < 0.0) {
-        bisector.x = -sign * along.y;
-        bisector.y = sign * along.x;
+    if (!is_at_vertex) {
+        if (norm(neighbour) < 0.5 || cosine < SHARPEST) return line;
+        Vector mean = {along.x + neighbour.x, along.y + neighbour.y};
+        double size = norm(mean);
+        Vector bisector = {-sign * mean.y / size, sign * mean.x / size};
+        /* On the inner side of a bend, the lines themselves are perpendicular to the segment. */
+        if (outward * (bisector.x * along.x + bisector.y * along.y) >= 0.0) limit = bisector;
     }
-    line.x = bisector.x + OVERLAP * outward * along.x;
-    line.y = bisector.y + OVERLAP * outward * along.y;
+    line.x = limit.x + OVERLAP * outward * along.x;
+    line.y = limit.y + OVERLAP * outward * along.y;
     return line;
+}
+
+/* Marks a segment at the vertex at which it begins or ends, if it does.
+
+   weights : barycentric coordinates of the end in its face
+   is_at_vertex : becomes 1 if it does */
+static int mark_at_vertex(const Mesh *mesh, int64_t *marks, int64_t face, const double *weights,
+                          int64_t segment, int *is_at_vertex)
+{
+    *is_at_vertex = 0;
+    for (int64_t j = 0; j < 3; j++) {
+        int64_t vertex;
+        if (weights[FIRST_END[j]] != 0.0 || weights[SECOND_END[j]] != 0.0) continue;
+        TRY(vertex_at(mesh, 3 * face + j, &vertex));
+        marks[vertex] = segment;
+        *is_at_vertex = 1;
+    }
+    return OK;
+}
+
+/* The outer side of the bend between the directions of two segments; 0 if it is not sharp. */
+static double outer_side(Vector before, Vector after)
+{
+    double turn = cross_of(before, after), cosine = before.x * after.x + before.y * after.y;
+    if (norm(before) < 0.5 || norm(after) < 0.5 || cosine > SHARP) return 0.0;
+    return turn > 0.0 ? -1.0 : 1.0;
+}
+
+/* The nearest place of a segment to a point in the plane of its face. */
+static Nearest nearest_of_segment(const Propagation *work, int64_t segment, Vector start,
+                                  Vector end, Vector point)
+{
+    const double *arcs = work->arcs + 2 * segment, *outer = work->outer + 2 * segment;
+    double share = nearest_share(start, end, point);
+    double side = cross_of(way(start, end), way(start, point)) < 0.0 ? -1.0 : 1.0;
+    /* A point whose path begins at a bend is on the outer side of it. */
+    if (share <= 0.0 && outer[0] != 0.0) side = outer[0];
+    if (share >= 1.0 && outer[1] != 0.0) side = outer[1];
+    return nearest_place(start, end, 0.0, arcs[0], arcs[1], side, point);
 }
 
 static int begin_segment(const Mesh *mesh, Propagation *work, int64_t segment)
 {
     double direction[3], before[3], after[3];
+    const double *arcs = work->arcs + 2 * segment;
     int64_t face = work->faces[segment];
     CHECK(face, mesh->face_count);
     CHECK(work->previous[segment] + 1, work->s + 1);
     CHECK(work->following[segment] + 1, work->s + 1);
+    int at_start, at_end;
+    TRY(mark_at_vertex(mesh, work->leaving, face, work->starts + 3 * segment, segment, &at_start));
+    TRY(mark_at_vertex(mesh, work->arriving, face, work->ends + 3 * segment, segment, &at_end));
     TRY(direction_of(mesh, work, segment, direction));
     TRY(unfolded_direction(mesh, work, face, work->previous[segment], before));
     TRY(unfolded_direction(mesh, work, face, work->following[segment], after));
@@ -375,12 +458,17 @@ static int begin_segment(const Mesh *mesh, Propagation *work, int64_t segment)
         Vector end = point_in(&plane, own, work->ends + 3 * segment);
         Vector along = direction_in(&plane, direction);
         if (norm(along) < 0.5) along.x = 1.0; /* a point, which has lines in all directions */
-        TRY(lower_apex(mesh, work, side, plane.apex, start, end, 0.0));
+        double *outer = work->outer + 2 * segment;
+        outer[0] = outer_side(direction_in(&plane, before), along);
+        outer[1] = outer_side(along, direction_in(&plane, after));
+        TRY(lower_apex(mesh, work, side, plane.apex, start, end,
+                       nearest_of_segment(work, segment, start, end, plane.apex)));
         for (int is_right = 0; is_right < 2; is_right++) {
             double sign = is_right ? -1.0 : 1.0;
-            Vector lines[2] = {outermost(along, direction_in(&plane, before), sign, -1.0),
-                               outermost(along, direction_in(&plane, after), sign, 1.0)};
-            TRY(add_from_segment(mesh, work, side, &plane, start, end, along, sign, lines));
+            Vector lines[2] = {
+                outermost(along, direction_in(&plane, before), sign, -1.0, at_start),
+                outermost(along, direction_in(&plane, after), sign, 1.0, at_end)};
+            TRY(add_from_segment(mesh, work, side, &plane, start, end, arcs, along, sign, lines));
         }
     }
     return OK;
@@ -411,6 +499,9 @@ static int add_through_window(const Mesh *mesh, Propagation *work, int64_t side,
     Window next = {.start = in_axes(way(begin, window->start), x_axis),
                    .end = in_axes(way(begin, window->end), x_axis),
                    .before = window->before,
+                   .from = window->from,
+                   .to = window->to,
+                   .side = window->side,
                    .low = low * length,
                    .high = high * length};
     Vector first = in_axes(window->at_high, x_axis), last = in_axes(window->at_low, x_axis);
@@ -430,8 +521,9 @@ static int cross_face(const Mesh *mesh, Propagation *work, int64_t side, Window 
     TRY(plane_of(mesh, side, &plane));
     int64_t own = side % 3, face_start = side - own;
     Vector apex = plane.apex, first = {0.0, 0.0}, second = {plane.length, 0.0};
-    if (distance_if_seen(&window, apex, work->scale) < INFINITY)
-        TRY(lower_apex(mesh, work, side, apex, window.start, window.end, window.before));
+    Nearest nearest = nearest_if_seen(&window, apex, work->scale);
+    if (nearest.distance < INFINITY)
+        TRY(lower_apex(mesh, work, side, apex, window.start, window.end, nearest));
     int64_t sides[2] = {face_start + (own + 1) % 3, face_start + (own + 2) % 3};
     TRY(add_through_window(mesh, work, sides[0], &window, second, apex));
     return add_through_window(mesh, work, sides[1], &window, apex, first);
@@ -456,35 +548,49 @@ static int next_corner(const Mesh *mesh, int64_t vertex, int64_t *side, int64_t 
     return OK;
 }
 
+/* The face at a corner in the plane, seen from the side opposite to it, and the angle there. */
+typedef struct {
+    Plane plane;
+    Vector first, second; /* from the corner to the ends of the side */
+    double angle;
+} CornerView;
+
+static int view_corner(const Mesh *mesh, int64_t corner, CornerView *view)
+{
+    TRY(plane_of(mesh, corner, &view->plane));
+    Vector apex = view->plane.apex;
+    Vector first = {-apex.x, -apex.y}, second = {view->plane.length - apex.x, -apex.y};
+    view->first = first;
+    view->second = second;
+    view->angle = angle_between(first, second);
+    return OK;
+}
+
 /* Lowers the distances of the other vertices of a face at a corner by paths along its sides.
 
-   angle : becomes the angle at the corner */
-static int lower_in_face(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
-                         double *angle)
+   to_first, to_second : the nearest place to the corner, with the side on which each path lies */
+static int lower_in_face(const Mesh *mesh, Propagation *work, int64_t corner,
+                         const CornerView *view, Nearest to_first, Nearest to_second)
 {
     int64_t own = corner % 3, start = corner - own;
-    Plane plane;
-    TRY(plane_of(mesh, corner, &plane));
-    Vector to_first = {-plane.apex.x, -plane.apex.y};
-    Vector to_second = {plane.length - plane.apex.x, -plane.apex.y}, along = {1.0, 0.0};
-    *angle = angle_between(to_first, to_second);
+    Vector first = view->first, second = view->second, along = {1.0, 0.0};
+    to_first.distance += norm(first);
+    to_second.distance += norm(second);
     /* Seen from the first end, the corner is the second end of the opposite side. */
-    TRY(lower(mesh, work, start + FIRST_END[own], distance + norm(to_first),
-              angle_between(along, way(to_first, (Vector){0.0, 0.0}))));
-    return lower(mesh, work, start + SECOND_END[own], distance + norm(to_second), 0.0);
+    TRY(lower(mesh, work, start + FIRST_END[own], to_first,
+              angle_between(along, way(first, (Vector){0.0, 0.0}))));
+    return lower(mesh, work, start + SECOND_END[own], to_second, 0.0);
 }
 
 /* Adds the window of the lines from a vertex across the face at a corner that make an angle from
    `low` to `high` with the edge to the first end of the opposite side. */
-static int add_from_vertex(const Mesh *mesh, Propagation *work, int64_t corner, double distance,
-                           double low, double high)
+static int add_from_vertex(const Mesh *mesh, Propagation *work, int64_t corner,
+                           const CornerView *view, Nearest nearest, double low, double high)
 {
-    Plane plane;
-    TRY(plane_of(mesh, corner, &plane));
-    Vector apex = plane.apex, to_first = {-apex.x, -apex.y};
-    double bounds[2] = {0.0, plane.length}, wanted[2] = {low, high};
+    Vector apex = view->plane.apex, to_first = view->first;
+    double length = view->plane.length, bounds[2] = {0.0, length}, wanted[2] = {low, high};
     for (int k = 0; k < 2; k++) { /* the widest interval of some that are halved in turn */
-        double inside = k ? 0.0 : plane.length, outside = bounds[k];
+        double inside = k ? 0.0 : length, outside = bounds[k];
         for (int i = 0; i < HALVINGS; i++) {
             Vector to_middle = {0.5 * (inside + outside) - apex.x, -apex.y};
             double angle = angle_between(to_first, to_middle);
@@ -495,9 +601,10 @@ static int add_from_vertex(const Mesh *mesh, Propagation *work, int64_t corner, 
         }
         bounds[k] = outside;
     }
-    Window window = {apex, apex, distance, bounds[0], bounds[1],
+    Window window = {apex, apex, nearest.distance, nearest.arc, nearest.arc, nearest.side,
+                     bounds[0], bounds[1],
                      {bounds[0] - apex.x, -apex.y}, {bounds[1] - apex.x, -apex.y}};
-    return add_window(mesh, work, corner, &window, plane.length);
+    return add_window(mesh, work, corner, &window, length);
 }
 
 /* The faces around a vertex, in order, with their angles. */
@@ -536,18 +643,140 @@ static int next_in_fan(const Mesh *mesh, Fan *fan)
     return OK;
 }
 
-/* Adds the lines that make an angle from `low` to `high` with the first edge of a fan. */
-static int add_from_fan(const Mesh *mesh, Propagation *work, Fan fan, double low, double high)
+/* Directions at a vertex, as angles from the first edge of the fan around it. They increase in the
+   order of the fan, and decrease in that of the reversed fan at a boundary. */
+typedef struct {
+    double of_first;  /* angle of the first face */
+    double sum;       /* of the angles of all faces */
+    int is_boundary;
+    double leaving;   /* direction of the curve, if it begins a segment here; else NAN */
+    double arriving;  /* direction back along the curve, if a segment ends here; else NAN */
+} Directions;
+
+/* The angle of a direction in the face at a corner, from the edge at which a fan enters it. */
+static double angle_in_face(const CornerView *view, int is_reversed, const double direction[3])
 {
-    double distance = work->distances[fan.vertex], begin = 0.0, angle;
-    for (; is_in_fan(mesh, &fan); begin += angle) {
-        TRY(lower_in_face(mesh, work, fan.corner, distance, &angle));
-        double from = low - begin, to = high - begin;
-        if (from < angle && to > 0.0) {
-            double least = fan.is_reversed ? angle - to : from;
-            double most = fan.is_reversed ? angle - from : to;
-            TRY(add_from_vertex(mesh, work, fan.corner, distance, least, most));
+    return angle_between(is_reversed ? view->second : view->first,
+                         direction_in(&view->plane, direction));
+}
+
+/* The angle in the present face of a fan of a segment that begins or ends at its vertex; NAN if it
+   is in another face.
+
+   sign : 1 if it begins there, -1 if it ends there */
+static int angle_of_segment(const Mesh *mesh, const Propagation *work, const Fan *fan,
+                            const CornerView *view, int64_t segment, double sign, double *angle)
+{
+    double along[3];
+    *angle = NAN;
+    if (segment < 0) return OK;
+    CHECK(segment, work->s);
+    if (work->faces[segment] != fan->corner / 3) return OK;
+    TRY(direction_of(mesh, work, segment, along));
+    for (int i = 0; i < 3; i++) along[i] *= sign;
+    *angle = angle_in_face(view, fan->is_reversed, along);
+    return OK;
+}
+
+/* Angles around a vertex; those of the curve only if it passes the vertex. */
+static int directions_at(const Mesh *mesh, const Propagation *work, int64_t vertex,
+                         Directions *found)
+{
+    Directions result = {0.0, 0.0, 0, NAN, NAN};
+    int is_on_curve = work->distances[vertex] <= work->scale;
+    for (int is_reversed = 0; is_reversed < 1 + result.is_boundary; is_reversed++) {
+        Fan fan = fan_around(work, vertex, is_reversed);
+        double begin = 0.0;
+        while (is_in_fan(mesh, &fan)) {
+            CornerView view;
+            double leaving = NAN, arriving = NAN;
+            TRY(view_corner(mesh, fan.corner, &view));
+            if (fan.steps == 0) result.of_first = view.angle;
+            if (fan.steps > 0 || !is_reversed) result.sum += view.angle;
+            if (is_on_curve) {
+                TRY(angle_of_segment(mesh, work, &fan, &view, work->leaving[vertex], 1.0,
+                                     &leaving));
+                TRY(angle_of_segment(mesh, work, &fan, &view, work->arriving[vertex], -1.0,
+                                     &arriving));
+            }
+            double sign = is_reversed ? -1.0 : 1.0, offset = is_reversed ? result.of_first : 0.0;
+            if (leaving == leaving) result.leaving = offset + sign * (begin + leaving);
+            if (arriving == arriving) result.arriving = offset + sign * (begin + arriving);
+            begin += view.angle;
+            TRY(next_in_fan(mesh, &fan));
         }
+        result.is_boundary = fan.corner < 0;
+    }
+    *found = result;
+    return OK;
+}
+
+/* The side of the curve on which a direction at one of its vertices lies. */
+static double side_of(const Directions *directions, double angle)
+{
+    double leaving = directions->leaving, arriving = directions->arriving;
+    /* At its end, the curve is continued in the opposite direction. */
+    double half = 0.5 * directions->sum;
+    if (leaving != leaving) leaving = arriving < half ? arriving + half : arriving - half;
+    if (arriving != arriving) arriving = leaving < half ? leaving + half : leaving - half;
+    if (leaving != leaving) return 0.0;
+    int is_between = angle > lesser(leaving, arriving) && angle < greater(leaving, arriving);
+    return is_between == (leaving < arriving) ? 1.0 : -1.0;
+}
+
+/* The nearest place to a vertex, as seen from a point in some direction. */
+static Nearest nearest_from(const Propagation *work, int64_t vertex, const Directions *directions,
+                            double angle)
+{
+    Nearest nearest = {work->distances[vertex], work->feet[vertex], work->beside[vertex]};
+    if (nearest.distance <= work->scale) nearest.side = side_of(directions, angle);
+    return nearest;
+}
+
+/* Adds the lines from a vertex into the present face of a fan that make an angle from `low` to
+   `high` with its first edge, on each side of the curve.
+
+   sign : 1, or -1 in the reversed fan
+   begin : angle of the edge at which the face is entered, from the first edge of this fan */
+static int add_into_face(const Mesh *mesh, Propagation *work, const Fan *fan,
+                         const CornerView *view, const Directions *directions, double sign,
+                         double begin, double low, double high)
+{
+    double end = begin + view->angle;
+    double offset = sign > 0.0 ? 0.0 : directions->of_first;
+    double cuts[2] = {sign * (directions->leaving - offset), sign * (directions->arriving - offset)};
+    double from = greater(low, begin), last = lesser(high, end);
+    while (from < last) {
+        double to = last;
+        for (int k = 0; k < 2; k++)
+            if (cuts[k] > from && cuts[k] < to) to = cuts[k];
+        Nearest nearest =
+            nearest_from(work, fan->vertex, directions, offset + sign * 0.5 * (from + to));
+        double least = fan->is_reversed ? end - to : from - begin;
+        double most = fan->is_reversed ? end - from : to - begin;
+        TRY(add_from_vertex(mesh, work, fan->corner, view, nearest, least, most));
+        from = to;
+    }
+    return OK;
+}
+
+/* Follows paths along the edges of a fan, and adds the lines that make an angle from `low` to
+   `high` with its first edge. */
+static int add_from_fan(const Mesh *mesh, Propagation *work, Fan fan, const Directions *directions,
+                        double low, double high)
+{
+    double sign = fan.is_reversed ? -1.0 : 1.0, begin = 0.0;
+    double offset = fan.is_reversed ? directions->of_first : 0.0;
+    while (is_in_fan(mesh, &fan)) {
+        CornerView view;
+        TRY(view_corner(mesh, fan.corner, &view));
+        double end = begin + view.angle;
+        Nearest entered = nearest_from(work, fan.vertex, directions, offset + sign * begin);
+        Nearest left = nearest_from(work, fan.vertex, directions, offset + sign * end);
+        TRY(lower_in_face(mesh, work, fan.corner, &view, fan.is_reversed ? left : entered,
+                          fan.is_reversed ? entered : left));
+        TRY(add_into_face(mesh, work, &fan, &view, directions, sign, begin, low, high));
+        begin = end;
         TRY(next_in_fan(mesh, &fan));
     }
     return OK;
@@ -558,29 +787,20 @@ static int add_from_fan(const Mesh *mesh, Propagation *work, Fan fan, double low
    vertex on a segment, in all directions. */
 static int leave_vertex(const Mesh *mesh, Propagation *work, int64_t vertex)
 {
-    double distance = work->distances[vertex], sum = 0.0, of_first, angle;
     double arrival = work->arrivals[vertex];
     CHECK(work->corners[vertex], 3 * mesh->face_count);
-    TRY(lower_in_face(mesh, work, work->corners[vertex], distance, &of_first));
-    int is_boundary = 0;
-    for (int is_reversed = 0; is_reversed < 1 + is_boundary; is_reversed++) {
-        Fan fan = fan_around(work, vertex, is_reversed);
-        while (is_in_fan(mesh, &fan)) {
-            TRY(lower_in_face(mesh, work, fan.corner, distance, &angle));
-            sum += angle;
-            TRY(next_in_fan(mesh, &fan));
-        }
-        is_boundary = fan.corner < 0;
-    }
-    int is_source = distance <= work->scale;
-    if (!is_source && !is_boundary && sum <= 2.0 * PI + SADDLE) return OK;
-    double low = arrival + PI - OVERLAP, high = arrival + sum - PI + OVERLAP;
+    Directions directions;
+    TRY(directions_at(mesh, work, vertex, &directions));
+    int is_source = work->distances[vertex] <= work->scale;
+    double low = arrival + PI - OVERLAP, high = arrival + directions.sum - PI + OVERLAP;
     if (is_source) low = -INFINITY;
-    if (is_source || is_boundary) high = INFINITY;
-    TRY(add_from_fan(mesh, work, fan_around(work, vertex, 0), low, high));
-    if (!is_boundary) return OK;
-    low = is_source ? -INFINITY : of_first - arrival + PI - OVERLAP;
-    return add_from_fan(mesh, work, fan_around(work, vertex, 1), low, INFINITY);
+    if (is_source || directions.is_boundary) high = INFINITY;
+    if (!is_source && !directions.is_boundary && directions.sum <= 2.0 * PI + SADDLE)
+        low = INFINITY;
+    TRY(add_from_fan(mesh, work, fan_around(work, vertex, 0), &directions, low, high));
+    if (!directions.is_boundary) return OK;
+    low = is_source ? -INFINITY : directions.of_first - arrival + PI - OVERLAP;
+    return add_from_fan(mesh, work, fan_around(work, vertex, 1), &directions, low, INFINITY);
 }
 
 /* Finds the distances of vertices and all windows, in calls of about `most_work` windows each.
@@ -633,27 +853,72 @@ static int64_t first_not_below(const int64_t *numbers, int64_t count, int64_t wa
     return low;
 }
 
-int distance_of_point(const Mesh *mesh, const Propagation *found, int64_t face,
-                      const double weights[3], double *distance)
+/* The side of the curve on which the straight path from a vertex of the curve to a point of a face
+   lies.
+
+   corner : the vertex, in the face */
+static int side_at_vertex(const Mesh *mesh, const Propagation *found, int64_t corner,
+                          const double direction[3], double *side)
 {
-    double position[3], least = INFINITY;
+    Directions directions;
+    int64_t vertex;
+    TRY(vertex_at(mesh, corner, &vertex));
+    CHECK(found->corners[vertex], 3 * mesh->face_count);
+    TRY(directions_at(mesh, found, vertex, &directions));
+    for (int is_reversed = 0; is_reversed < 1 + directions.is_boundary; is_reversed++) {
+        Fan fan = fan_around(found, vertex, is_reversed);
+        double begin = 0.0;
+        while (is_in_fan(mesh, &fan)) {
+            CornerView view;
+            TRY(view_corner(mesh, fan.corner, &view));
+            if (fan.corner == corner) {
+                double angle = begin + angle_in_face(&view, fan.is_reversed, direction);
+                *side = side_of(&directions, is_reversed ? directions.of_first - angle : angle);
+                return OK;
+            }
+            begin += view.angle;
+            TRY(next_in_fan(mesh, &fan));
+        }
+    }
+    return OK;
+}
+
+/* The nearest place to a point by a straight path in its face from a corner. */
+static int nearest_from_corner(const Mesh *mesh, const Propagation *found, int64_t corner,
+                               const double *place, const double position[3], Nearest *nearest)
+{
+    int64_t vertex;
+    TRY(vertex_at(mesh, corner, &vertex));
+    double through = found->distances[vertex] + distance_between(position, place);
+    if (!(through < nearest->distance - found->scale)) return OK;
+    nearest->distance = through;
+    nearest->arc = found->feet[vertex];
+    nearest->side = found->beside[vertex];
+    if (found->distances[vertex] > found->scale) return OK;
+    double direction[3];
+    for (int i = 0; i < 3; i++) direction[i] = position[i] - place[i];
+    return side_at_vertex(mesh, found, corner, direction, &nearest->side);
+}
+
+/* Segments in the face itself come first: a window that only touches a bend would show the points
+   near it on the wrong side. */
+int nearest_to_point(const Mesh *mesh, const Propagation *found, int64_t face,
+                     const double weights[3], Nearest *nearest)
+{
+    double position[3];
     const double *corners[3];
+    Nearest least = {INFINITY, 0.0, 0.0};
     Plane plane;
     TRY(corners_of(mesh, face, corners));
     interpolate(corners, weights, position);
-    for (int j = 0; j < 3; j++) {
-        int64_t vertex;
-        TRY(vertex_at(mesh, 3 * face + j, &vertex));
-        double through = found->distances[vertex] + distance_between(position, corners[j]);
-        least = lesser(least, through);
-    }
     TRY(plane_of(mesh, 3 * face, &plane));
     Vector point = point_in(&plane, 0, weights);
     int64_t k = first_not_below(found->faces, found->s, face);
     for (; k < found->s && found->faces[k] == face; k++) {
         Vector start = point_in(&plane, 0, found->starts + 3 * k);
         Vector end = point_in(&plane, 0, found->ends + 3 * k);
-        least = lesser(least, norm(way(nearest_on(start, end, point), point)));
+        Nearest own = nearest_of_segment(found, k, start, end, point);
+        if (own.distance < least.distance - found->scale) least = own;
     }
     k = first_not_below(found->sides, found->count, 3 * face);
     for (int64_t side = 3 * face; k < found->count && found->sides[k] < 3 * face + 3; k++) {
@@ -662,17 +927,57 @@ int distance_of_point(const Mesh *mesh, const Propagation *found, int64_t face,
             TRY(plane_of(mesh, side, &plane));
             point = point_in(&plane, side % 3, weights);
         }
-        least = lesser(least, distance_if_seen(&found->windows[k], point, found->scale));
+        Nearest seen = nearest_if_seen(&found->windows[k], point, found->scale);
+        if (seen.distance < least.distance - found->scale) least = seen;
     }
-    *distance = least;
+    for (int j = 0; j < 3; j++)
+        TRY(nearest_from_corner(mesh, found, 3 * face + j, corners[j], position, &least));
+    *nearest = least;
     return OK;
 }
 
-/* Distances of m points, as `distance_of_point` finds them. */
-EXPORTED int distances_of_points(const Mesh *mesh, const Propagation *found, int64_t m,
-                                 const int64_t *faces, const double *barycentric, double *distances)
+/* The width at an arc length. */
+static double width_at(const Propagation *found, double arc)
 {
-    for (int64_t i = 0; i < m; i++)
-        TRY(distance_of_point(mesh, found, faces[i], barycentric + 3 * i, distances + i));
+    int64_t low = 0, high = found->k - 1;
+    while (high - low > 1) {
+        int64_t middle = low + (high - low) / 2;
+        if (found->knots[middle] <= arc)
+            low = middle;
+        else
+            high = middle;
+    }
+    double length = greater(found->knots[high] - found->knots[low], TINY);
+    double share = lesser(greater((arc - found->knots[low]) / length, 0.0), 1.0);
+    return (1.0 - share) * found->widths[low] + share * found->widths[high];
+}
+
+static double scaled(const Propagation *found, const Nearest *nearest)
+{
+    if (found->k == 0 || nearest->distance == INFINITY) return nearest->distance;
+    return nearest->distance * found->least_width / width_at(found, nearest->arc);
+}
+
+int scaled_distance(const Mesh *mesh, const Propagation *found, int64_t face,
+                    const double weights[3], double *distance)
+{
+    Nearest nearest;
+    TRY(nearest_to_point(mesh, found, face, weights, &nearest));
+    *distance = scaled(found, &nearest);
+    return OK;
+}
+
+/* The nearest places to m points, and their scaled distances. */
+EXPORTED int nearest_to_points(const Mesh *mesh, const Propagation *found, int64_t m,
+                               const int64_t *faces, const double *barycentric, double *distances,
+                               double *arcs, double *sides)
+{
+    for (int64_t i = 0; i < m; i++) {
+        Nearest nearest;
+        TRY(nearest_to_point(mesh, found, faces[i], barycentric + 3 * i, &nearest));
+        distances[i] = scaled(found, &nearest);
+        arcs[i] = nearest.arc;
+        sides[i] = nearest.side;
+    }
     return OK;
 }

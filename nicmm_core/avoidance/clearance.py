@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import nicmm_kernels
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import ArgumentError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray
 from ..geometry.curve import weights_in_faces
-from ..geometry.mesh import Mesh, opposite_sides
+from ..geometry.mesh import Mesh
 from ..geometry.segment_distances import FaceSegments, SegmentDistances
 from ..geometry.surface_points import SurfacePoints
-from ..progress import checkpoint
-from ..repair.divided_faces import positive_parts, side_lengths
+from ..repair.divided_faces import positive_parts
 from ..repair.face_parts import FaceParts
+from ..repair.level_refinement import distances_up_to, refined_surface
 from ..repair.mapped_mesh import MappedMesh
 from ..repair.removed_faces import points_at
 from .avoided_curve import FADE, Avoided
@@ -42,10 +41,6 @@ middle of their sides, in clearances. Faces with greater errors are bisected fur
 
 SNAP = 0.006
 """Distance up to which the line at the clearance is moved to a vertex, in clearances."""
-
-REACH = 1.25
-"""Distance beyond the line up to which distances are computed, in lengths of the longest edge of
-the faces there, if that is at most `COARSEST`."""
 
 RINGS = 3
 """Number of rings of faces, around those within reach, that may be bisected with them."""
@@ -100,15 +95,8 @@ def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
 
 def distances_near(mesh: Mesh, segments: FaceSegments, clearance: float) -> SegmentDistances:
     """Distances from the segments as far as they are needed."""
-    # A straight distance is not greater than a distance along the surface.
-    longest = side_lengths(mesh.vertices, mesh.faces).max(axis=1)
-    away, _ = cKDTree(np.concatenate(segments.positions(mesh))).query(
-        mesh.vertices, distance_upper_bound=LEVEL * clearance + longest.max()
-    )
-    near = away[mesh.faces].min(axis=1) <= LEVEL * clearance + longest
-    longest = min(longest[near].max(initial=0.0), COARSEST * clearance)
     try:
-        return SegmentDistances(mesh, segments, LEVEL * clearance + REACH * longest)
+        return distances_up_to(mesh, segments, LEVEL * clearance, COARSEST * clearance)
     except nicmm_kernels.TooManyWindowsError as error:
         raise ArgumentError(
             f"clearance is {clearance:g}, which reaches over too many faces of this mesh; use a "
@@ -131,33 +119,10 @@ def beyond_clearance(
     fixed[others.faces] = True
 
     level = LEVEL * clearance
-    refined = nicmm_kernels.refine_at_level(
-        distances.paths,
-        nicmm_kernels.PartArrays(
-            np.ascontiguousarray(parts.faces),
-            opposite_sides(parts.faces).astype(np.int64),
-            np.ascontiguousarray(parts.parent),
-            np.ascontiguousarray(parts.corners),
-            np.ascontiguousarray(vertices),
-            _distances_of_vertices(distances, parts, len(vertices)),
-            fixed,
-        ),
-        reached,
-        nicmm_kernels.LevelLimits(
-            level, clearance, COARSEST * clearance, FINEST * clearance, ERROR * clearance
-        ),
-        checkpoint,
+    limits = nicmm_kernels.LevelLimits(
+        level, clearance, COARSEST * clearance, FINEST * clearance, ERROR * clearance
     )
-    parts = FaceParts(refined.faces, refined.parents, refined.corners)
+    refined = refined_surface(distances, parts, vertices, fixed, limits)
     values = refined.distances - level
-    parts, vertices = positive_parts(parts, refined.vertices, values, SNAP * clearance)
+    parts, vertices = positive_parts(refined.parts, refined.vertices, values, SNAP * clearance)
     return others.joined(parts), vertices
-
-
-def _distances_of_vertices(distances: SegmentDistances, parts: FaceParts, count: int) -> FloatArray:
-    """Distances of the vertices of parts, (count,); infinite for other vertices."""
-    vertex, first = np.unique(parts.faces, return_index=True)
-    row, corner = np.divmod(first, 3)
-    found = np.full(count, np.inf)
-    found[vertex] = distances.at(SurfacePoints(parts.parent[row], parts.corners[row, corner]))
-    return found

@@ -7,6 +7,7 @@ kernel. The cost follows the surface within the limit, not the size of the mesh.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -95,12 +96,18 @@ class SegmentDistances:
     Attributes
     ----------
     paths : nicmm_kernels.SegmentPaths
+    total : float
+        Total length of the segments.
     """
 
     def __init__(self, mesh: Mesh, segments: FaceSegments, limit: float) -> None:
         self.mesh, self.segments, self.limit = mesh, segments, limit
         scale = SAME_POINT * mesh.diagonal
-        previous, following = _neighbours(mesh, segments, scale)
+        start, end = segments.positions(mesh)
+        previous, following = _neighbours(start, end, scale)
+        total = np.cumsum(np.linalg.norm(end - start, axis=1))
+        arcs = np.stack([np.append(0.0, total[:-1]), total], axis=1)
+        self.total = float(total[-1]) if len(total) else 0.0
         self.paths = nicmm_kernels.SegmentPaths(
             mesh.for_kernels,
             np.ascontiguousarray(segments.faces),
@@ -108,6 +115,7 @@ class SegmentDistances:
             np.ascontiguousarray(segments.end),
             previous,
             following,
+            arcs,
             limit,
             scale,
             checkpoint,
@@ -126,6 +134,25 @@ class SegmentDistances:
         reached[self.segments.faces] = reached[self.paths.sides // 3] = True
         return reached
 
+    def relative_to(self, knots: FloatArray, widths: FloatArray) -> SegmentDistances:
+        """The distances relative to a width that varies along the segments.
+
+        Parameters
+        ----------
+        knots : (k,) float array
+            Total lengths of the segments up to some places, ascending.
+        widths : (k,) float array
+            Widths there, positive, and linear in between.
+
+        Returns
+        -------
+        SegmentDistances
+            Distances divided by the width at the nearest place, and multiplied by the least width.
+        """
+        found = copy(self)
+        found.paths = self.paths.relative_to(knots, widths)
+        return found
+
     def _bound_corners(self) -> None:
         """Give all corners of the faces reached a finite distance, that of a path along edges."""
         corners, distance = self.mesh.faces[self.faces_reached], self.at_vertices
@@ -140,16 +167,35 @@ class SegmentDistances:
 
     def at(self, points: SurfacePoints) -> FloatArray:
         """Distance of points, (n,); greater ones than the limit may be too great or infinite."""
+        return self.nearest(points)[0]
+
+    def nearest(self, points: SurfacePoints) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The nearest places on the segments.
+
+        Parameters
+        ----------
+        points : SurfacePoints
+            n points.
+
+        Returns
+        -------
+        distances : (n,) float array
+        arcs : (n,) float array
+            Total length of the segments up to the nearest place.
+        sides : (n,) float array
+            1 for points to the left of the segments, seen with the normals upwards; -1 for points
+            to the right. They have a meaning only if the segments are those of one curve, in order,
+            on an oriented mesh.
+        """
         checkpoint()
-        return self.paths.at(
+        return self.paths.nearest(
             np.ascontiguousarray(points.faces), np.ascontiguousarray(points.barycentric)
         )
 
 
-def _neighbours(mesh: Mesh, segments: FaceSegments, scale: float) -> tuple[IntArray, IntArray]:
+def _neighbours(start: FloatArray, end: FloatArray, scale: float) -> tuple[IntArray, IntArray]:
     """The segment before and after each one in the list, where they meet; else -1."""
-    index = np.arange(len(segments))
-    start, end = segments.positions(mesh)
+    index = np.arange(len(start))
     meet = np.linalg.norm(start - np.roll(end, 1, axis=0), axis=1) <= scale
     previous = np.where(meet, np.roll(index, 1), -1)
     following = np.where(np.roll(meet, -1), np.roll(index, -1), -1)

@@ -322,6 +322,7 @@ def arguments_segments_in_faces(s=6):
         "ends": half,
         "previous": np.full(s, -1),
         "following": np.full(s, -1),
+        "arcs": np.stack([np.arange(s), np.arange(s) + 1.0], axis=1),
         "limit": 0.8,
         "scale": 1e-14,
         "meanwhile": nothing,
@@ -331,10 +332,10 @@ def arguments_segments_in_faces(s=6):
 
 
 def distances_from_segments(at_faces, at_barycentric, **given):
-    """The sides that shortest paths enter, and the distances of points."""
+    """The sides that shortest paths enter, and the nearest places to points."""
     with mock.patch.object(nicmm_kernels.segment_distances, "MOST_WINDOWS", FEW_WINDOWS):
         paths = nicmm_kernels.SegmentPaths(**given)
-    return paths.sides, paths.at(at_faces, at_barycentric)
+    return paths.sides, *paths.nearest(at_faces, at_barycentric)
 
 
 def arguments_refinement(f=12):
@@ -811,7 +812,7 @@ def test_bisected_triangles_conform_and_cover_the_same_area():
     np.testing.assert_allclose(in_parents, found.vertices[found.faces], atol=1e-14)
     new = np.arange(len(found.vertices)) >= len(BALL.vertices)
     row, corner = np.nonzero(new[found.faces])
-    exact = given["paths"].at(found.parents[row], found.corners[row, corner])
+    exact, _, _ = given["paths"].nearest(found.parents[row], found.corners[row, corner])
     near = exact < given["limits"].level
     assert near.sum() > 100
     there = found.distances[found.faces[row, corner]]
