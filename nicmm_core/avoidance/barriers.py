@@ -6,7 +6,6 @@ run along the parts of the curves from which no clearance is kept.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +14,9 @@ from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh, edge_keys, edge_lengths
-from ..outputs.cut import CutMesh, cut_mesh
-from ..progress import checkpoint
+from ..outputs.cut import cut_mesh
 from ..repair.divided_faces import edges_of, with_divided_edges
-from ..repair.face_parts import FaceParts, whole_faces
+from ..repair.face_parts import FaceParts
 from ..repair.mapped_mesh import MappedMesh
 from .avoided_curve import FADE, Avoided, gap_width
 
@@ -83,19 +81,8 @@ def without_strips(
     mesh: Mesh, barriers: list[SurfaceCurve], clearance: float
 ) -> tuple[FaceParts, FloatArray]:
     """The faces without a narrow strip along each of some curves, and the vertices of the parts."""
-    parts, cut, chain = whole_faces(mesh.faces), mesh, np.zeros((0, 2), dtype=np.int64)
-    for barrier in barriers:
-        checkpoint()
-        points, _ = parts.through(mesh, barrier)
-        mapped = curve_on_mesh(
-            cut, barrier.closed, points.faces, points.barycentric, barrier.control_index
-        )
-        result = cut_mesh(cut, mapped, deviation=DEVIATION * mesh.mean_edge_length)
-        chain = np.concatenate([_with_new_points(cut, result, chain), result.chain_edges])
-        corners = result.corner_weights(cut) @ parts.corners[result.source_face]
-        parts = FaceParts(result.faces, parts.parent[result.source_face], corners)
-        cut = result.mesh
-    vertices = cut.vertices
+    cut = cut_mesh(mesh, barriers, deviation=DEVIATION * mesh.mean_edge_length)
+    parts, vertices, chain = cut.parts(mesh), cut.vertices, cut.chain_edges
     size = len(vertices)
     on_chain = np.zeros(size, dtype=bool)
     on_chain[chain] = True
@@ -120,22 +107,3 @@ def without_strips(
     parts, vertices = with_divided_edges(parts, vertices, ends, middle, share)
     on_chain = np.append(on_chain, np.zeros(len(ends), dtype=bool))
     return parts.taken(~on_chain[parts.faces].any(axis=1)), vertices
-
-
-def _with_new_points(mesh: Mesh, cut: CutMesh, chain: IntArray) -> IntArray:
-    """Edges of earlier cuts, (e, 2), divided at the vertices that a cut has inserted on them."""
-    corners, weights = mesh.faces[cut.new_face], cut.new_barycentric
-    on_edge = np.flatnonzero((weights > 0.0).sum(axis=1) == 2)
-    along: dict[tuple[int, int], list[tuple[float, int]]] = defaultdict(list)
-    for number in on_edge.tolist():
-        (a, s), (b, t) = sorted(
-            (int(v), float(w))
-            for v, w in zip(corners[number], weights[number], strict=True)
-            if w > 0.0
-        )
-        along[a, b].append((t / (s + t), len(mesh.vertices) + number))
-    edges: list[tuple[int, int]] = []
-    for a, b in np.sort(chain, axis=1).tolist():
-        stops = [a, *(vertex for _, vertex in sorted(along.get((a, b), []))), b]
-        edges += zip(stops[:-1], stops[1:], strict=True)
-    return np.array(edges, dtype=np.int64).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Cuts a mesh along a curve: the result is the same surface, with the curve as a chain of edges.
+"""Cuts a mesh along curves: the result is the same surface, with the curves as chains of edges.
 
 Every face that the curve crosses or touches is triangulated. The faces at a cut edge share its new
 vertices, so a conforming mesh stays conforming. New vertices have barycentric coordinates in input
@@ -9,18 +9,27 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arguments import number_between
-from ..errors import CurveError
+from ..errors import ArgumentError, CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, checked_curve, points_of
+from ..geometry.curve import (
+    SurfaceCurve,
+    checked_curve,
+    points_of,
+    weights_in_faces,
+    with_points,
+)
 from ..geometry.mesh import Mesh, adjacent_sides, sides_among
-from ..geometry.surface_points import in_faces, weights_at
+from ..geometry.surface_points import SurfacePoints, in_faces, weights_at
 from ..geometry.tolerances import ROUNDED
+from ..progress import checkpoint
+from ..repair.face_parts import FaceParts
 from .chain import Chain, build_chain, necessary_points
 from .triangulation import ConstraintError, FaceTriangulation
 
@@ -36,7 +45,7 @@ FLAT = 1e-9
 
 @dataclass(frozen=True)
 class CutMesh:
-    """A mesh that has a curve as a chain of its edges.
+    """A mesh that has curves as chains of its edges.
 
     Attributes
     ----------
@@ -52,11 +61,14 @@ class CutMesh:
     new_barycentric : (n, 3) float array
         Barycentric coordinates of each new vertex in that face.
     chain : (m,) int array
-        Distinct vertices along the curve, each joined to the next by an edge.
+        Distinct vertices along the curve, or the last of several curves, each joined to the next by
+        an edge.
     closed : bool
         Whether the last vertex of the chain is joined to the first.
     chain_point : (m,) int array
-        Index of the point of the curve at each vertex of the chain.
+        Index of the point of this curve at each vertex of the chain, or of the one before it.
+    earlier_edges : (e, 2) int array
+        Edges along the other curves.
     """
 
     vertices: FloatArray
@@ -67,6 +79,7 @@ class CutMesh:
     chain: IntArray
     closed: bool
     chain_point: IntArray
+    earlier_edges: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -75,13 +88,13 @@ class CutMesh:
 
     @property
     def chain_edges(self) -> IntArray:
-        """Edges along the curve, (m, 2), or (m - 1, 2) if the curve is open."""
+        """Edges along the curves, (e, 2)."""
         edges = np.stack([self.chain, np.roll(self.chain, -1)], axis=1)
-        return edges if self.closed else edges[:-1]
+        return np.concatenate([self.earlier_edges, edges if self.closed else edges[:-1]])
 
     @cached_property
     def adjacent_faces(self) -> tuple[IntArray, BoolArray]:
-        """Pairs of faces with a common edge, (p, 2), and whether the curve runs along it, (p,).
+        """Pairs of faces with a common edge, (p, 2), and whether a curve runs along it, (p,).
 
         An edge with k faces has k - 1 pairs.
         """
@@ -90,7 +103,7 @@ class CutMesh:
 
     @cached_property
     def directed_chain_edges(self) -> frozenset[tuple[int, int]]:
-        """Edges along the curve in both directions, for fast lookup."""
+        """Edges along the curves in both directions, for fast lookup."""
         edges = self.chain_edges.tolist()
         return frozenset((a, b) for a, b in edges) | frozenset((b, a) for a, b in edges)
 
@@ -110,6 +123,10 @@ class CutMesh:
         corners = mesh.faces[self.new_face[new]]
         weights[face, corner] = weights_at(corners, self.new_barycentric[new], theirs[face])
         return weights
+
+    def parts(self, mesh: Mesh) -> FaceParts:
+        """The faces as parts of those of the mesh that was cut."""
+        return FaceParts(self.faces, self.source_face, self.corner_weights(mesh))
 
     def at_corners(self, mesh: Mesh, values: FloatArray) -> FloatArray:
         """Interpolate values at the corners of faces, such as UV coordinates with seams.
@@ -144,16 +161,19 @@ class CutMesh:
 
 
 def cut_mesh(
-    mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT, deviation: float = 0.0
+    mesh: Mesh,
+    curve: SurfaceCurve | Sequence[SurfaceCurve],
+    snap: float = SNAP_CUT,
+    deviation: float = 0.0,
 ) -> CutMesh:
-    """Cut a mesh along a curve on it.
+    """Cut a mesh along a curve on it, or along several.
 
     Parameters
     ----------
     mesh : Mesh
         The mesh that the curve was designed on. It may have boundaries and need not be oriented.
-    curve : SurfaceCurve
-        A simple curve, closed or open.
+    curve : SurfaceCurve or sequence of SurfaceCurve
+        A simple curve, closed or open, or several of them.
     snap : float, default 0.001
         Barycentric coordinate up to which a point snaps to the edge or vertex, to avoid needles,
         except where the curve would then touch itself.
@@ -170,7 +190,7 @@ def cut_mesh(
     CurveError
         If the curve is not on this mesh, or crosses or touches itself.
     ArgumentError
-        If ``snap`` or ``deviation`` is out of range.
+        If ``snap`` or ``deviation`` is out of range, or there is no curve.
 
     Examples
     --------
@@ -184,6 +204,46 @@ def cut_mesh(
     """
     snap = number_between("snap", snap, 0.0, LARGEST_SNAP)
     deviation = number_between("deviation", deviation, 0.0, np.inf, "a length")
+    if not isinstance(curve, Sequence):
+        return _cut_along_one(mesh, curve, snap, deviation)
+    if not len(curve):
+        raise ArgumentError("curve is an empty list; pass at least one curve")
+    found = _cut_along_one(mesh, curve[0], snap, deviation)
+    for further in curve[1:]:
+        checkpoint()
+        found = _cut_again(mesh, found, further, snap, deviation)
+    return found
+
+
+def _cut_again(
+    mesh: Mesh, before: CutMesh, curve: SurfaceCurve, snap: float, deviation: float
+) -> CutMesh:
+    """Cut a mesh along another curve."""
+    curve, segment_faces = checked_curve(mesh, curve)
+    weights = weights_in_faces(mesh, curve.faces, curve.barycentric, segment_faces)
+    curve = replace(curve, faces=segment_faces, barycentric=weights)
+    parts = before.parts(mesh)
+    points, segment = parts.through(mesh, curve)
+    number = np.searchsorted(segment, np.arange(len(curve.faces)))
+    found = _cut_along_one(
+        before.mesh, with_points(before.mesh, curve, points, number), snap, deviation
+    )
+    new = parts.in_parents(SurfacePoints(found.new_face, found.new_barycentric))
+    return CutMesh(
+        vertices=found.vertices,
+        faces=found.faces,
+        source_face=before.source_face[found.source_face],
+        new_face=np.concatenate([before.new_face, new.faces]),
+        new_barycentric=np.concatenate([before.new_barycentric, new.barycentric]),
+        chain=found.chain,
+        closed=found.closed,
+        chain_point=segment[found.chain_point],
+        earlier_edges=_with_new_points(before.mesh, found, before.chain_edges),
+    )
+
+
+def _cut_along_one(mesh: Mesh, curve: SurfaceCurve, snap: float, deviation: float) -> CutMesh:
+    """Cut a mesh along a curve."""
     curve, segment_faces = checked_curve(mesh, curve)
     must_keep = np.zeros(len(curve.faces), dtype=bool)
     must_keep[curve.control_index[curve.control_index >= 0]] = True
@@ -371,3 +431,22 @@ def _flattened(corners: FloatArray, weights: FloatArray) -> FloatArray:
     if np.abs(np.linalg.det(sides)) <= FLAT * longest**2:
         sides = np.array([[1.0, 0.5], [0.0, 0.75**0.5]])
     return weights[:, 1:] @ sides.T
+
+
+def _with_new_points(mesh: Mesh, cut: CutMesh, chain: IntArray) -> IntArray:
+    """Edges of earlier cuts, (e, 2), divided at the vertices that a cut has inserted on them."""
+    corners, weights = mesh.faces[cut.new_face], cut.new_barycentric
+    on_edge = np.flatnonzero((weights > 0.0).sum(axis=1) == 2)
+    along: dict[tuple[int, int], list[tuple[float, int]]] = defaultdict(list)
+    for number in on_edge.tolist():
+        (a, s), (b, t) = sorted(
+            (int(v), float(w))
+            for v, w in zip(corners[number], weights[number], strict=True)
+            if w > 0.0
+        )
+        along[a, b].append((t / (s + t), len(mesh.vertices) + number))
+    edges: list[tuple[int, int]] = []
+    for a, b in np.sort(chain, axis=1).tolist():
+        stops = [a, *(vertex for _, vertex in sorted(along.get((a, b), []))), b]
+        edges += zip(stops[:-1], stops[1:], strict=True)
+    return np.array(edges, dtype=np.int64).reshape(-1, 2)

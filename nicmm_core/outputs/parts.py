@@ -1,4 +1,4 @@
-"""Separates a surface along a curve: the two sides of the curve get separate vertices."""
+"""Separates a surface along curves: the two sides of a curve get separate vertices."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
     uncut = ~sides_among(cut.faces, cut.chain_edges)[one]
     # At a vertex off the curve all corners stay joined, even if the vertex is non-manifold.
     order = np.argsort(vertex, kind="stable")
-    off = ~np.isin(vertex[order[1:]], cut.chain)
+    off = ~np.isin(vertex[order[1:]], cut.chain_edges)
     beside = np.flatnonzero((np.diff(vertex[order]) == 0) & off)
     rows = np.concatenate([ends[one[uncut]].ravel(), order[beside]])
     columns = np.concatenate([ends[other[uncut]].ravel(), order[beside + 1]])
