@@ -24,6 +24,7 @@ from .operators import (
     time_slices,
     update_curves,
 )
+from .outputs import parallel_curves
 from .scene import surface_cache
 from .tool import (
     course_choice,
@@ -41,6 +42,7 @@ MODULES = (
     preferences,
     settings,
     surface_cache,
+    parallel_curves,
     time_slices,
     design_curve,
     convert_curve,

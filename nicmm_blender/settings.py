@@ -14,7 +14,7 @@ from bpy.props import (
 )
 
 from ..nicmm_core.options import COMPOUND_KINDS, OPTIONS, Kind, Option
-from .outputs import sticky_curves, writing
+from .outputs import parallel_curves, sticky_curves, writing
 from .scene import curve_record, mirror_plane
 
 AUTOMATIC = (
@@ -191,6 +191,12 @@ class OutputProperties:
                 "A hair curves object that follows the mesh when it is deformed. "
                 "The mesh stays unchanged",
             ),
+            (
+                "PARALLEL",
+                "Parallel Curves",
+                "A curve object with curves at constant distances from the curve along the "
+                "surface, which follows the curve. The curve itself is kept",
+            ),
             ("EDGES", "Cut Edges", "Cut the mesh so that the curve becomes a chain of its edges"),
             ("REGION", "Region", "The part of the mesh that the curve encloses"),
             ("PARTS", "Separate Parts", "Cut the mesh and separate it along the curve"),
@@ -250,6 +256,9 @@ class OutputProperties:
         step=0.1,
     )
     tube: _tube_property(False)
+    parallel_distance: parallel_curves.DISTANCE
+    parallel_count: parallel_curves.COUNT
+    both_sides: parallel_curves.BOTH_SIDES
     mark_seam: BoolProperty(
         name="Mark Seam",
         description="Mark the edges along the curve as UV seams",
@@ -478,6 +487,9 @@ def draw_output(
         "thickness": appearance and output in writing.SEPARATE and not properties.radius,
         "offset": appearance and output in writing.SEPARATE,
         "tube": output == "STICKY",
+        "parallel_distance": output == "PARALLEL",
+        "parallel_count": output == "PARALLEL",
+        "both_sides": output == "PARALLEL",
         "region_as": output == "REGION",
         "region_cut": output == "REGION",
         "parts_as": output == "PARTS",

@@ -8,7 +8,7 @@ from ..operators import curve_settings, live_update, maps
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..operators.message_labels import draw_message
-from ..outputs import edited_curve
+from ..outputs import edited_curve, parallel_curves
 from ..scene import curve_record, mesh_data
 from . import curve_list, icons, map_rows, menus
 
@@ -38,6 +38,9 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
             if curve == context.active_object:
                 self._draw_conversion(layout, properties)
             return
+        if parallel_curves.is_parallel(context.active_object):
+            self._draw_parallel(layout, context.active_object)
+            return
         settings.draw_design(layout, properties, mesh_data.mesh_object(context))
         settings.draw_output(layout, properties)
         operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
@@ -46,6 +49,20 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
         menus.draw_edit(layout, context)
         if context.mode == "EDIT_MESH":
             layout.label(text="The Surface Curve tool does not work in Edit Mode", icon="INFO")
+
+    def _draw_parallel(self, layout: bpy.types.UILayout, parallel: bpy.types.Object) -> None:
+        """Draw the settings of parallel curves."""
+        group = parallel.nicmm_parallel
+        layout.label(text=parallel.name, icon=icons.PARALLEL)
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        row = layout.row()
+        row.enabled = False
+        row.prop(group, "source")
+        for name in ("distance", "count", "both_sides", "spline", "offset"):
+            layout.prop(group, name)
+        if group.problem:
+            draw_message(layout, group.problem)
 
     def _draw_conversion(
         self, layout: bpy.types.UILayout, properties: bpy.types.PropertyGroup

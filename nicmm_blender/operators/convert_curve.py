@@ -5,9 +5,9 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import settings
-from ..outputs import curve_object, tube_radius, writing
+from ..outputs import curve_object, parallel_curves, tube_radius, writing
 from ..scene import avoided_curves, curve_record, mesh_data, mirror_plane
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted
 from . import polls
 from .error_reports import with_error_reports
 
@@ -47,7 +47,9 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings.draw_output(self.layout, self)
-        self.layout.prop(self, "keep_original")
+        row = self.layout.row()
+        row.active = self.output != writing.PARALLEL  # which always keeps it
+        row.prop(self, "keep_original")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         settings.choose_tube(self)
@@ -65,6 +67,10 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         mesh_data.synchronise(mesh_object)
         surface = curve_record.surface_of(original, mesh_object)
         curves = curve_record.read_curves(original, surface)
+        if self.output == writing.PARALLEL:
+            _, count = parallel_curves.add(context, original, surface, curves, self)
+            self.report({"INFO"}, f'"{name}": {counted(count, "parallel curve")}')
+            return {"FINISHED"}
         curve_settings = curve_record.settings_of(original)
         is_separate = self.output in writing.SEPARATE
         if is_separate:

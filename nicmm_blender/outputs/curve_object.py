@@ -92,16 +92,24 @@ def to_object_space(curve_object: bpy.types.Object, points: np.ndarray) -> np.nd
             return points
         to_curve = np.array(to_mesh.inverted_safe())
     else:
-        in_world = np.array(curve_record.mesh_in_any_scene(curve_object).matrix_world)
+        in_world = np.array(curve_record.mesh_in_any_scene(_designed(curve_object)).matrix_world)
         to_curve = np.array(curve_object.matrix_world.inverted_safe()) @ in_world
     return points @ to_curve[:3, :3].T + to_curve[:3, 3]
 
 
 def _mesh_of(curve_object: bpy.types.Object) -> bpy.types.Object | None:
     """The mesh on which a curve was designed; the parent of an object without a record yet."""
-    if curve_record.has_record(curve_object):
-        return curve_record.mesh_of(curve_object)
+    designed = _designed(curve_object)
+    if curve_record.has_record(designed):
+        return curve_record.mesh_of(designed)
     return curve_object.parent
+
+
+def _designed(curve_object: bpy.types.Object) -> bpy.types.Object:
+    """The designed curve itself, or that to which the curves of an object are parallel."""
+    if curve_record.has_record(curve_object):
+        return curve_object
+    return curve_object.nicmm_parallel.source or curve_object
 
 
 def write_splines(curve_object: bpy.types.Object, splines: list[Spline]) -> None:

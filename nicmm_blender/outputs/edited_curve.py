@@ -34,7 +34,7 @@ from ..scene.mirror_images import Images
 from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface, active_modifiers_text
 from ..scene.via_points import ViaPoints, leg_before, no_via_points, number_of_legs
-from . import curve_object, writing
+from . import curve_object, parallel_curves, writing
 from .writing import ObjectSettings
 
 if TYPE_CHECKING:
@@ -374,6 +374,7 @@ def rewrite(edited: Opened, points: ControlPoints, curves: list[SurfaceCurve]) -
     writing.redraw(result, edited.surface, curves, points.corners, edited.mirror)
     drawn = curve_record.drawn_as(result)
     _record(result, mesh_object, edited, points, curves, drawn)
+    parallel_curves.follow(result, edited.surface, curves)
     return result
 
 

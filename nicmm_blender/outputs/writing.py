@@ -20,7 +20,7 @@ from ..scene.messages import InputError, check_finite, counted, sentence
 from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface
 from ..scene.via_points import ViaPoints
-from . import curve_object, mesh_cut, sticky_curves, tube_radius
+from . import curve_object, mesh_cut, parallel_curves, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 SEPARATE = ("CURVE", "STICKY")
 """Outputs that are separate objects."""
+
+PARALLEL = "PARALLEL"
+"""The output that adds parallel curves to a curve object."""
 
 SAME_SCALE = 1e-5
 """Relative difference of scales in single precision that should be equal."""
@@ -65,6 +68,9 @@ class OutputSettings(ObjectSettings, Protocol):
     region_cut: bool
     other_side: bool
     parts_as: str
+    parallel_distance: float
+    parallel_count: int
+    both_sides: bool
 
 
 @dataclass
@@ -97,7 +103,7 @@ def apply(
     (k,), tells which of their control points are corners, without mirror images, `via` are their
     via points, and `others` the curves that they avoid.
     """
-    if settings.output in SEPARATE:
+    if settings.output in (*SEPARATE, PARALLEL):
         new_object = as_object(mesh_object, surface, curves, settings, corners, mirror)
         drawn = drawn_as(settings)
         controls = _controls(curves, corners, mirror)
@@ -114,6 +120,9 @@ def apply(
             others,
         )
         curve_object.place(context, mesh_object, new_object)
+        if settings.output == PARALLEL:
+            _, count = parallel_curves.add(context, new_object, surface, curves, settings)
+            return counted(count, "parallel curve")
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
     if mirror is not None and not mirror.joined:
         raise InputError(
@@ -263,6 +272,7 @@ def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design |
         request.via,
         request.others,
     )
+    parallel_curves.follow(designed, request.surface, answer.curves)
 
 
 def _controls(
