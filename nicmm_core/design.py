@@ -291,7 +291,7 @@ class Designer:
             if not options["clearance"]:
                 return
             mapped, there = self._curve_on_manifold(
-                curve, "design", "the clearance is measured there, so leave clearance out"
+                curve, "design", "on which the clearance is measured; leave clearance out"
             )
             for number, each in enumerate(avoided):
                 if is_too_close(mapped, there, each, options["clearance"]):
@@ -322,7 +322,7 @@ class Designer:
         widths = checked_distances(checked, distances)
         with self._exclusive():
             mapped, there = self._curve_on_manifold(
-                checked, "curve", "offsets are computed there, so design a curve elsewhere"
+                checked, "curve", "on which its offsets are computed; design a curve elsewhere"
             )
             return offset_curves(mapped, there, widths)
 
@@ -334,13 +334,13 @@ class Designer:
         Raises
         ------
         CurveError
-            If no manifold has it. The message names the argument, and what follows.
+            If no manifold has it. The message names the argument, and ends with the consequence.
         """
         for mapped in self._whole.manifolds():
             there = mapped.curve_to(curve) if mapped.differs else curve
             if there is not None:
                 return mapped, there
-        raise CurveError(f"{name} cannot be mapped to a manifold; {consequence}")
+        raise CurveError(f"{name} cannot be mapped to a manifold, {consequence}")
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:

@@ -307,11 +307,6 @@ static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, c
 {
     Vector corners[2] = {{0.0, 0.0}, {plane->length, 0.0}};
     double values[3][2], low = 0.0, high = 1.0;
-    /* A side along the segment itself has its lines on one side only. */
-    Vector inward = {0.0, 1.0};
-    if (lesser(start.y, end.y) <= work->scale && greater(start.y, end.y) <= work->scale &&
-        norm(way(start, end)) > work->scale && sign * cross_of(along, inward) > 0.0)
-        return OK;
     for (int i = 0; i < 2; i++) {
         values[0][i] = sign * cross_of(along, way(start, corners[i]));
         values[1][i] = sign * cross_of(way(start, corners[i]), lines[0]);
@@ -321,6 +316,11 @@ static int add_from_segment(const Mesh *mesh, Propagation *work, int64_t side, c
     }
     for (int k = 0; k < 3; k++) clip(values[k][0], values[k][1], &low, &high);
     if (!(low < high)) return OK;
+    /* Lines that lead away from a side meet it only beyond an end of the segment. If the segment is
+       almost parallel to the side, rounding errors are that large. */
+    if (norm(way(start, end)) > work->scale && sign * along.x > 0.0 &&
+        (high - low) * plane->length * fabs(along.y) <= work->scale)
+        return OK;
     Window window = {start, end, 0.0, arcs[0], arcs[1], sign, low * plane->length,
                      high * plane->length, {0, 0}, {0, 0}};
     Vector at_low = {window.low, 0.0}, at_high = {window.high, 0.0};

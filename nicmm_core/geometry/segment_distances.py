@@ -17,7 +17,7 @@ import numpy as np
 from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .curve import SurfaceCurve, checked_curve, weights_in_faces
+from .curve import SurfaceCurve, checked_curve, weights_in_faces, without_small_weights
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
@@ -101,6 +101,9 @@ class SegmentDistances:
     """
 
     def __init__(self, mesh: Mesh, segments: FaceSegments, limit: float) -> None:
+        # An end that is almost at a vertex counts as there, where lines in all directions begin.
+        ends = (without_small_weights(weights) for weights in (segments.start, segments.end))
+        segments = FaceSegments(segments.faces, *ends)
         self.mesh, self.segments, self.limit = mesh, segments, limit
         scale = SAME_POINT * mesh.diagonal
         start, end = segments.positions(mesh)

@@ -22,6 +22,7 @@ CORE = (
     "avoidance/clearance.py",
     "avoidance/contacts.py",
     "avoidance/off_curves.py",
+    "offsets/curve_offsets.py",
     "outputs/cut.py",
     "outputs/region.py",
     "path/legs.py",

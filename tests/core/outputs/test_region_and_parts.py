@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import nearest_points
 from nicmm_core.outputs.cut import cut_mesh
 from nicmm_core.outputs.parts import part_mesh
 from nicmm_core.outputs.region import enclosed_region
@@ -204,3 +205,65 @@ def test_curve_along_the_rim_bounds_the_whole_surface():
     corners = [(0, (1, 0, 0)), (0, (0, 1, 0)), (0, (0, 0, 1)), (1, (0, 0, 1))]
     cut = cut_mesh(mesh, curve_at(mesh, corners, True))
     assert enclosed_region(mesh, cut).area == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("half_width", [0.2, 0.5])
+def test_a_strip_between_two_offsets_of_a_great_circle_has_the_area_of_a_zone(half_width):
+    mesh = shapes.sphere(5)
+    angle = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
+    places = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
+    curve = nicmm.design_curve(mesh, nearest_points(mesh, places)[0]).curves[0]
+    designer = nicmm.Designer(mesh)
+    [left], [right] = designer.offset_curves(curve, [half_width, -half_width])
+    cut = cut_mesh(mesh, [left, right])
+    assert_surface_unchanged(mesh, cut)
+    strip = enclosed_region(mesh, cut, side_of=curve.points[:1])
+    assert strip.area == pytest.approx(4.0 * np.pi * np.sin(half_width), rel=1e-3)
+    parted = part_mesh(cut)
+    assert parted.part.max() == 2
+    assert components_without(cut.faces, cut.chain_edges) == 3
+
+
+def test_two_curves_around_a_tube_bound_a_region_although_one_does_not():
+    mesh = shapes.torus(around=48, across=24)
+    rings = []
+    for at in (0, 12):
+        across = mesh.vertices[[24 * at + 8 * step for step in range(3)]]
+        rings.append(nicmm.design_curve(mesh, across).curves[0])
+    with pytest.raises(nicmm.CurveError, match="bounds no region"):
+        enclosed_region(mesh, cut_mesh(mesh, rings[0]))
+    region = enclosed_region(mesh, cut_mesh(mesh, rings))
+    assert region.area == pytest.approx(mesh.face_areas.sum() / 4.0, rel=0.01)
+
+
+def test_curves_that_cross_can_be_cut_one_after_the_other():
+    mesh = grid(8)
+    low, high = mesh.vertices[:, :2].min(axis=0), mesh.vertices[:, :2].max(axis=0)
+    middle = 0.5 * (low + high) + 0.013
+
+    def line(start, end):
+        places = np.column_stack([np.array([start, end]), np.zeros(2)])
+        return nicmm.design_curve(mesh, places, closed=False).curves[0]
+
+    across = line((low[0], middle[1]), (high[0], middle[1]))
+    along = line((middle[0], low[1]), (middle[0], high[1]))
+    cut = cut_mesh(mesh, [across, along])
+    assert_surface_unchanged(mesh, cut)
+    assert part_mesh(cut).part.max() == 3
+
+
+def assert_surface_unchanged(mesh, cut):
+    """The parts cover their source faces, with the orientation of these."""
+    assert euler_characteristic(cut.faces) == euler_characteristic(mesh.faces)
+    weights = cut.corner_weights(mesh)
+    assert np.linalg.det(weights).min() > 0.0
+    np.testing.assert_allclose(
+        np.bincount(cut.source_face, cut.mesh.face_areas), mesh.face_areas, rtol=1e-7
+    )
+    positions = cut.at_corners(mesh, mesh.vertices[mesh.faces])
+    np.testing.assert_allclose(positions, cut.vertices[cut.faces], atol=1e-9 * mesh.diagonal)
+
+
+def test_an_empty_list_of_curves_is_refused(cap):
+    with pytest.raises(nicmm.ArgumentError, match="empty list"):
+        cut_mesh(cap[0], [])
