@@ -62,6 +62,7 @@ MEASUREMENTS = (
     "messes",
     "fuzz",
     "cuts",
+    "offsets",
 )
 """Modules of this package, in the order of RESULTS.md; see `report` for what each one defines."""
 
