@@ -1,4 +1,4 @@
-"""Command line: ``python -m nicmm_core design | pretrain | shapes``."""
+"""Command line: ``python -m nicmm_core design | offset | pretrain | shapes``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from . import Status, design_curve, options
+from . import Designer, Status, design_curve, options
 from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
@@ -54,6 +54,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     design.set_defaults(run=_design)
 
+    offset = commands.add_parser("offset", help="curves at a distance from a curve")
+    offset.add_argument("mesh", metavar="MESH", help="OBJ, OFF, PLY or STL")
+    offset.add_argument("curve", metavar="CURVE.json", help="written by design with -o CURVE.json")
+    offset.add_argument(
+        "--distance",
+        action="append",
+        required=True,
+        metavar="D|D,D,D",
+        help="along the surface, positive to the left, negative to the right; with commas one "
+        "distance for each control point; repeatable. Write --distance=-1 for a negative one",
+    )
+    offset.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
+    offset.set_defaults(run=_offset)
+
     pretrain = commands.add_parser("pretrain", help="train the network (stage 1 of the paper)")
     pretrain.add_argument("meshes", nargs="+", metavar="MESH")
     pretrain.add_argument("-o", "--output", required=True, metavar="WEIGHTS.npz")
@@ -95,10 +109,26 @@ def _design(given: argparse.Namespace) -> None:
         )
 
 
-def numbered(path: str, number: int) -> str:
-    """Add the number of an alternative to a path: ``curve.obj`` becomes ``curve-1.obj``.
+def _offset(given: argparse.Namespace) -> None:
+    check_curve_path(given.output)
+    designer = Designer(read_mesh(given.mesh))
+    distances = [_lengths("distance", text) for text in given.distance]
+    found = designer.offset_curves(read_curve(given.curve), distances)
+    number = 0
+    for text, curves in zip(given.distance, found, strict=True):
+        if not curves:
+            print(f"distance {text}: no place on that side is so far away", file=sys.stderr)
+        for curve in curves:
+            path = numbered(given.output, number)
+            write_curve(path, curve)
+            print(f"distance {text}, length {curve.length:g}: {path}", file=sys.stderr)
+            number += 1
 
-    The design itself has number 0 and keeps the path.
+
+def numbered(path: str, number: int) -> str:
+    """Add the number of a further curve to a path: ``curve.obj`` becomes ``curve-1.obj``.
+
+    The first curve has number 0 and keeps the path.
     """
     plain = Path(path)
     return str(plain.with_stem(f"{plain.stem}-{number}")) if number else path
@@ -166,6 +196,17 @@ def _indices(flag: str, text: str, what: str, example: str) -> list[int]:
         raise ArgumentError(
             f"--{flag} is {text!r}; give {what} separated by commas, such as {example}"
         ) from error
+
+
+def _lengths(flag: str, text: str) -> float | list[float]:
+    """Parse a length, or several separated by commas."""
+    try:
+        found = [float(number) for number in text.split(",")]
+    except ValueError as error:
+        raise ArgumentError(
+            f"--{flag} is {text!r}; give a length, or lengths separated by commas, such as 0.1,0.2"
+        ) from error
+    return found if len(found) > 1 else found[0]
 
 
 def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> FloatArray | None:

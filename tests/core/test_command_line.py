@@ -222,3 +222,22 @@ def test_automatic_maps_are_those_of_the_functions(mesh_file, tmp_path, options,
     assert status == (2 if expected is None else 0)
     if expected is not None:
         np.testing.assert_array_equal(json.loads(output.read_text())["faces"], expected.faces)
+
+
+def test_offset_writes_the_curves_at_each_distance(mesh_file, tmp_path, capsys):
+    curve, output = tmp_path / "curve.json", tmp_path / "parallel.json"
+    assert main(["design", str(mesh_file), "--points", CHOSEN, "-o", str(curve)]) == 0
+    given = ["offset", str(mesh_file), str(curve), "-o", str(output)]
+    assert main([*given, "--distance", "0.1", "--distance=-0.1,-0.2,-0.1"]) == 0
+    mesh = read_mesh(mesh_file)
+    design = nicmm.design_curve(mesh, [3, 60, 100])
+    for number, distance in enumerate((0.1, [-0.1, -0.2, -0.1])):
+        [expected] = nicmm.offset_curve(mesh, design, distance)
+        path = tmp_path / ("parallel-1.json" if number else "parallel.json")
+        data = json.loads(path.read_text())
+        np.testing.assert_allclose(data["points"], expected.points, rtol=0, atol=1e-6)
+    capsys.readouterr()
+    assert main([*given, "--distance", "0.1,far"]) == 2
+    assert "--distance is '0.1,far'" in capsys.readouterr().err
+    assert main([*given, "--distance", "3"]) == 0
+    assert "no place on that side is so far away" in capsys.readouterr().err

@@ -222,3 +222,52 @@ def test_a_segment_on_an_edge_is_as_near_as_its_points(surface):
         near = bound < 0.3 * (1.0 - 1e-9)
         assert near.any()
         assert (found[near] <= bound[near] + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("name", ["ball", "flat_disc", "body"])
+def test_sides_are_those_of_the_enclosed_region(request, name, seed):
+    """Curves run through vertices and along edges, and cross faces."""
+    mesh = request.getfixturevalue(name)
+    vertices = np.random.default_rng(seed).choice(len(mesh.vertices), 4, replace=False)
+    curve = nicmm.design_curve(mesh, vertices, order="shortest").curves[0]
+    cut = nicmm.cut_mesh(mesh, curve, snap=0.0)
+    region = nicmm.enclosed_region(mesh, cut)
+    whole = np.flatnonzero(np.bincount(cut.source_face, minlength=len(mesh.faces)) == 1)
+    centroids = nicmm.SurfacePoints(whole, np.full((len(whole), 3), 1.0 / 3.0))
+    limit = 0.15 * mesh.diagonal
+    away, arcs, sides = SegmentDistances(mesh, segments_of(mesh, curve), limit).nearest(centroids)
+    near = away < limit
+    inside = region.faces[whole[near]]
+    assert 0 < inside.sum() < near.sum()
+    assert set(sides[near][inside]) != set(sides[near][~inside])
+    assert len(set(sides[near][inside])) == len(set(sides[near][~inside])) == 1
+
+
+def test_the_nearest_place_has_the_distance(ball):
+    """The straight distance to the place at the arc length is not greater, and almost equal."""
+    curve = nicmm.design_curve(ball, [5, 200, 400, 600], order="shortest").curves[0]
+    points = random_surface_points(ball, 300, seed=8)
+    distances = SegmentDistances(ball, segments_of(ball, curve), 0.3)
+    away, arcs, _ = distances.nearest(points)
+    ends = np.concatenate([curve.points, curve.points[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(curve.steps, axis=1))])
+    place = np.stack([np.interp(arcs, along, ends[:, axis]) for axis in range(3)], axis=1)
+    straight = np.linalg.norm(points.positions(ball) - place, axis=1)
+    near = away < 0.3
+    assert near.sum() > 50
+    assert (straight[near] <= away[near] + 1e-12).all()
+    assert (straight[near] >= 0.98 * away[near]).all()
+
+
+def test_distances_relative_to_a_width(ball):
+    curve = nicmm.design_curve(ball, [5, 200, 400, 600], order="shortest").curves[0]
+    points = random_surface_points(ball, 100, seed=8)
+    distances = SegmentDistances(ball, segments_of(ball, curve), 0.3)
+    away, arcs, _ = distances.nearest(points)
+    knots, widths = np.array([0.0, 1.0, distances.total]), np.array([0.2, 0.5, 0.1])
+    relative = distances.relative_to(knots, widths).at(points)
+    near = away < 0.3
+    expected = 0.1 * away / np.interp(arcs, knots, widths)
+    np.testing.assert_allclose(relative[near], expected[near], rtol=1e-12)
+    np.testing.assert_array_equal(distances.at(points), away)
