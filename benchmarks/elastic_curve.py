@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from nicmm_core.geometry.mesh import Mesh
-from tests.oracles.geodesic_curvature import geodesic_curvature
 
 from .polylines import NearestPoints
 

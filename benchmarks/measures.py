@@ -6,9 +6,9 @@ import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve, resample
+from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.normals import vertex_normals
-from tests.oracles.geodesic_curvature import geodesic_curvature
 
 SAMPLES = 128
 """Number of evenly spaced points of a curve at which curvature is measured.

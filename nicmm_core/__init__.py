@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from .geometry.curve import SurfaceCurve as SurfaceCurve
     from .geometry.mesh import Mesh as Mesh
     from .geometry.surface_points import SurfacePoints as SurfacePoints
+    from .io.files import read_curve as read_curve
+    from .io.files import read_mesh as read_mesh
+    from .io.files import write_curve as write_curve
+    from .io.files import write_mesh as write_mesh
     from .maps.feature_maps import curvature_map as curvature_map
     from .maps.feature_maps import edge_map as edge_map
     from .maps.feature_maps import principal_curvatures as principal_curvatures
@@ -58,6 +62,12 @@ _NAMES = {
     "geometry.curve": ("SurfaceCurve",),
     "geometry.mesh": ("Mesh",),
     "geometry.surface_points": ("SurfacePoints",),
+    "io.files": (
+        "read_curve",
+        "read_mesh",
+        "write_curve",
+        "write_mesh",
+    ),
     "maps.feature_maps": (
         "curvature_map",
         "edge_map",

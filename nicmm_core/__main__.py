@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 from pathlib import Path
@@ -52,6 +53,12 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         help="least angle between face normals at a sharp edge, in degrees (default: 30)",
     )
+    design.add_argument(
+        "--measures",
+        action="store_true",
+        help="print lengths, enclosed area, least radius, greatest slope and distance from "
+        "obstacles as JSON on standard output, one line for each curve",
+    )
     design.set_defaults(run=_design)
 
     offset = commands.add_parser("offset", help="curves at a distance from a curve")
@@ -92,11 +99,8 @@ def _design(given: argparse.Namespace) -> None:
     check_curve_path(given.output)
     mesh = read_mesh(given.mesh)
     points = _indices("points", given.points, "vertex indices", "12,80,41")
-    design = design_curve(
-        mesh,
-        points,
-        **{option.name: _value(option, given, mesh) for option in options.OPTIONS},
-    )
+    values = {option.name: _value(option, given, mesh) for option in options.OPTIONS}
+    design = design_curve(mesh, points, **values)
     if design.status is Status.NOT_ONE_CURVE:
         raise NicmmError(str(design.status))
     for number, each in enumerate([design, *design.alternatives]):
@@ -107,6 +111,11 @@ def _design(given: argparse.Namespace) -> None:
             f"{len(points)} points, length {curve.length:g}, {each.status.name.lower()}: {path}",
             file=sys.stderr,
         )
+        if given.measures:
+            found = curve.measures(mesh, values["obstacles"], corners=values["corners"])
+            if math.isinf(found["least_radius"]):
+                found["least_radius"] = None  # JSON has no infinity
+            print(json.dumps({"file": path, **found}))
 
 
 def _offset(given: argparse.Namespace) -> None:

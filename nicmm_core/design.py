@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike
 from .arguments import (
     check_iterations,
     checked_corners,
+    checked_map,
     checked_options,
     checked_surface_curve,
 )
@@ -54,6 +55,7 @@ from .geometry.surface_points import (
     nearest_points,
     snapped,
 )
+from .measures import checked_up, measures_of
 from .offsets.curve_offsets import checked_distances, offset_curves
 from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
@@ -325,6 +327,24 @@ class Designer:
                 checked, "curve", "on which its offsets are computed; design a curve elsewhere"
             )
             return offset_curves(mapped, there, widths)
+
+    def measures(
+        self,
+        curve: SurfaceCurve | Design,
+        obstacles: ArrayLike | None = None,
+        up: ArrayLike = (0.0, 0.0, 1.0),
+        corners: Any = None,
+    ) -> dict[str, Any]:
+        """The measures of a curve on this mesh, as `SurfaceCurve.measures` describes them."""
+        given = only_curve(curve, "curve") if isinstance(curve, Design) else curve
+        checked = checked_surface_curve(self.mesh, "curve", given)
+        weights, direction = checked_map("obstacles", obstacles, self.mesh), checked_up(up)
+        bends = checked_corners(corners, len(checked.control_index))
+        with self._exclusive():
+            mapped, there = self._curve_on_manifold(
+                checked, "curve", "on which areas and distances are measured"
+            )
+            return measures_of(mapped, checked, there, weights, direction, bends)
 
     def _curve_on_manifold(
         self, curve: SurfaceCurve, name: str, consequence: str

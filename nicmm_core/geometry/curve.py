@@ -6,10 +6,12 @@ curves.
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
@@ -62,6 +64,49 @@ class SurfaceCurve:
         if self.closed:
             return np.roll(self.points, -1, axis=0) - self.points
         return np.diff(self.points, axis=0)
+
+    def measures(
+        self,
+        mesh: Mesh,
+        obstacles: ArrayLike | None = None,
+        up: ArrayLike = (0.0, 0.0, 1.0),
+        corners: ArrayLike | None = None,
+    ) -> dict[str, Any]:
+        """Measure the curve.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh on which it lies.
+        obstacles : (V,) float array_like, optional
+            Weights at the vertices; faces whose corners all have weight 1 are obstacles.
+        up : (3,) float array_like, default (0, 0, 1)
+            The direction in which slopes are measured.
+        corners : sequence of int, optional
+            Indices of control points at which the curve turns freely, as for its design. Curvature
+            is not measured there.
+
+        Returns
+        -------
+        dict
+            ``length``, in mesh units. ``leg_lengths``, a list of the lengths between consecutive
+            control points. ``area`` of the smaller side of the curve, or None if it bounds no
+            region. ``least_radius`` of geodesic curvature, infinite for a geodesic, measured over
+            a few edges, and ``least_radius_at``, its position or None. ``greatest_slope``, the
+            greatest angle with the plane perpendicular to `up`, in radians.
+            ``distance_to_obstacle``, the least distance along the surface, or None.
+
+        Raises
+        ------
+        CurveError
+            If the curve does not lie on the mesh.
+        ArgumentError
+            If another argument cannot be used.
+        """
+        # The modules that measure use this one, so they are imported when they are needed.
+        design = importlib.import_module("..design", __package__)
+        found: dict[str, Any] = design.Designer(mesh).measures(self, obstacles, up, corners)
+        return found
 
 
 def curve_on_mesh(

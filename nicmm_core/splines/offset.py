@@ -1,4 +1,4 @@
-"""Computes points at a given height above the surface."""
+"""Computes normals of the surface at points, and points at a given height above it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ from ..repair.clean_surface import joined_surface
 def offset_points(
     mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float
 ) -> FloatArray:
-    """Positions of points of a mesh, moved along its normals.
-
-    The angle-weighted vertex normals are interpolated in the face and scaled to unit length. Where
-    they cancel, the face normal is used instead; if the face has no area either, the point stays
-    where it is. Before, coincident vertices are joined, and faces are turned to the side to which
-    most faces of their component point.
+    """Positions of points of a mesh, moved along `surface_normals`.
 
     Parameters
     ----------
@@ -36,6 +31,26 @@ def offset_points(
     -------
     (n, 3) float array
     """
+    normals = surface_normals(mesh, faces, barycentric)
+    return SurfacePoints(faces, barycentric).positions(mesh) + height * normals
+
+
+def surface_normals(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+    """Unit normals of the surface at points of a mesh, (n, 3).
+
+    The angle-weighted vertex normals are interpolated in the face and scaled to unit length. Where
+    they cancel, the face normal is used instead; if the face has no area either, the normal is
+    zero. Before, coincident vertices are joined, and faces are turned to the side to which most
+    faces of their component point.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    faces : (n,) int array
+        The face in which each point lies.
+    barycentric : (n, 3) float array
+        Coordinates in these faces.
+    """
     surface = joined_surface(mesh)
     which = turned_faces(surface.mesh)
     vertex_normal = vertex_normals(surface.mesh.vertices, turned(surface.mesh.faces, which))
@@ -47,5 +62,4 @@ def offset_points(
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     # Where the normals at the corners cancel, the normal of the face replaces them.
     sound = length > 1e-6
-    normals = np.where(sound, normals / np.where(sound, length, 1.0), face_normals)
-    return SurfacePoints(faces, barycentric).positions(mesh) + height * normals
+    return np.where(sound, normals / np.where(sound, length, 1.0), face_normals)

@@ -241,3 +241,17 @@ def test_offset_writes_the_curves_at_each_distance(mesh_file, tmp_path, capsys):
     assert "--distance is '0.1,far'" in capsys.readouterr().err
     assert main([*given, "--distance", "3"]) == 0
     assert "no place on that side is so far away" in capsys.readouterr().err
+
+
+def test_measures_are_printed_as_json(mesh_file, tmp_path, capsys):
+    output = tmp_path / "curve.json"
+    given = ["design", str(mesh_file), "--points", CHOSEN, "-o", str(output), "--measures"]
+    assert main(given) == 0
+    [line] = capsys.readouterr().out.splitlines()
+    found = json.loads(line)
+    mesh = nicmm.read_mesh(mesh_file)
+    expected = nicmm.read_curve(output).measures(mesh)
+    assert found.pop("file") == str(output)
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name] == (None if value is None else pytest.approx(value, rel=1e-6))

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from nicmm_core import SurfaceCurve
 from nicmm_core.geometry.curve import along_leg, curve_on_mesh, points_of_leg, resample
+from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from tests.core.checks import circle, random_surface_points
-from tests.oracles.geodesic_curvature import geodesic_curvature
 
 ANGLES = np.arange(60) * 2 * np.pi / 60
 UP = np.tile([0.0, 0.0, 1.0], (60, 1))

@@ -10,6 +10,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
 from nicmm_core.geometry.crossings import crossing_segments
 from nicmm_core.geometry.curve import resample
+from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation import relaxing
@@ -30,7 +31,6 @@ from tests.core.checks import (
     scaled,
 )
 from tests.oracles import messes
-from tests.oracles.geodesic_curvature import geodesic_curvature
 
 ANGLES = np.arange(60) * 2 * np.pi / 60
 CONTROLS = np.arange(0, 60, 12)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nicmm_core.geometry.array_types import FloatArray
+from .array_types import FloatArray
 
 
 def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = True) -> FloatArray:
