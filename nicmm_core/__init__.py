@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .design import Designer as Designer
     from .design import design_curve as design_curve
+    from .design import fit_stroke as fit_stroke
     from .design import mirrored as mirrored
     from .design import offset_curve as offset_curve
     from .design_result import Design as Design
@@ -46,6 +47,7 @@ _NAMES = {
     "design": (
         "Designer",
         "design_curve",
+        "fit_stroke",
         "mirrored",
         "offset_curve",
     ),

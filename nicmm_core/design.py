@@ -75,6 +75,7 @@ from .repaired_surface import (
 from .request import Request, same_request
 from .start import WITHOUT_START
 from .status import Status
+from .stroke import checked_stroke, fitted_points
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,
@@ -327,6 +328,20 @@ class Designer:
                 checked, "curve", "on which its offsets are computed; design a curve elsewhere"
             )
             return offset_curves(mapped, there, widths)
+
+    def fit_stroke(
+        self, points: ArrayLike, tolerance: float, closed: bool = False
+    ) -> SurfacePoints:
+        """The control points that `fit_stroke` finds, as points of the surface."""
+        if not isinstance(closed, bool | np.bool_):
+            raise ArgumentError(f"closed is {closed!r}; pass True or False")
+        stroke, within = checked_stroke(self.mesh, points, tolerance, bool(closed))
+
+        def design(controls: SurfacePoints, start: SurfaceCurve | None) -> SurfaceCurve:
+            found = self.design(controls, closed=bool(closed), start=start)
+            return only_curve(found, "design")
+
+        return fitted_points(self.mesh, stroke, within, bool(closed), design)
 
     def measures(
         self,
@@ -728,3 +743,49 @@ def offset_curve(
     designer = Designer(mesh)
     (found,) = designer.offset_curves(curve, [distance])
     return found
+
+
+def fit_stroke(
+    mesh: Mesh, points: ArrayLike, tolerance: float, *, closed: bool = False
+) -> FloatArray:
+    """Few control points whose curve follows a stroke, such as a line drawn by hand.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : (n, 3) float array_like
+        The stroke, in order: positions near the surface, possibly noisy.
+    tolerance : float
+        Greatest distance between the stroke and the curve, in mesh units.
+    closed : bool, default False
+        Whether the stroke is closed; its last point is then joined to the first.
+
+    Returns
+    -------
+    (k, 3) float array
+        Control points on the surface. Every point of ``design_curve(mesh, found, closed=closed)``
+        is within the tolerance of the stroke, and every point of the stroke within the tolerance
+        of the curve, measured in space.
+
+    Raises
+    ------
+    ControlPointError
+        If the stroke is farther from the surface than the tolerance.
+    UnreachableError
+        If no curve was found that follows the stroke, for example since it crosses itself.
+    ArgumentError
+        If an argument cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(4)
+    >>> angle = np.linspace(0.0, 2.0, 200)
+    >>> stroke = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    >>> len(nicmm.fit_stroke(mesh, stroke, tolerance=0.05)) < 6
+    True
+    """
+    found = Designer(mesh).fit_stroke(points, tolerance, closed)
+    return found.positions(mesh)

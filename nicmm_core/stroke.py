@@ -1,0 +1,345 @@
+"""Finds few control points whose curve follows a stroke: a dense, noisy polyline near the surface.
+
+The stroke is smoothed by a spline, and control points are places on it:
+
+1. The first ones are the fewest whose natural cubic spline stays near the stroke, since it bends
+   like the curve of a design. The curve is designed, and where it leaves the tolerance, a control
+   point is added, until it does not.
+2. These are often more than needed. So with only some of them, the curve is relaxed again from the
+   one found (`start=`), which is fast and keeps its course, and points are added in the same way.
+3. The curve through these is designed without a start, as the caller will do. If it takes another
+   course, control points are added, up to the number of the first step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline, splev, splprep
+from scipy.spatial import cKDTree
+
+from .arguments import checked_number
+from .errors import ArgumentError, ControlPointError, CurveError, UnreachableError
+from .geometry.array_types import FloatArray, IntArray
+from .geometry.curve import SurfaceCurve
+from .geometry.mesh import Mesh, real_array
+from .geometry.surface_points import SurfacePoints, nearest_points, snapped
+from .geometry.tolerances import COINCIDENT
+from .options import FEWEST_CLOSED, FEWEST_OPEN
+from .progress import checkpoint
+from .splines.offset import surface_normals
+
+SMOOTHING = 0.35
+"""Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
+this size is removed."""
+
+PLACES = 400
+"""Number of places on the smoothed stroke among which control points are chosen."""
+
+MARGIN = 0.6
+"""Distance that the spline of the first step keeps from the smoothed stroke, in tolerances. The
+curve of a design differs from it, and the stroke from the smoothed one."""
+
+SPARSE = 3
+"""The second step begins with one of so many control points of the first."""
+
+DENSE = 0.1
+"""Distance of the samples between which distances of lines are measured, in tolerances."""
+
+MOST_SAMPLES = 20_000
+"""Greatest number of these samples on a line."""
+
+MOST_ROUNDS, MOST_ROUNDS_FROM_START, MOST_CHECKS = 8, 12, 2
+"""Greatest number of curves that are designed in each of the three steps."""
+
+APART = 3
+"""Least number of places between two control points."""
+
+Curves = Callable[[SurfacePoints, SurfaceCurve | None], SurfaceCurve]
+"""Designs the curve through control points, from a start if there is one."""
+
+
+def checked_stroke(
+    mesh: Mesh, points: Any, tolerance: Any, closed: bool
+) -> tuple[FloatArray, float]:
+    """Check a stroke and its tolerance.
+
+    Returns
+    -------
+    (n, 3) float array
+        Points of the stroke, without repetitions.
+    float
+
+    Raises
+    ------
+    ArgumentError
+        If the points or the tolerance cannot be used.
+    """
+    wanted = "a positive length"
+    within = checked_number("tolerance", tolerance, wanted)
+    if within <= 0.0:
+        raise ArgumentError(f"tolerance is {tolerance!r}; pass {wanted}")
+    try:
+        stroke = real_array(points)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(f"points cannot be read as numbers ({error})") from error
+    if stroke.ndim != 2 or stroke.shape[1] != 3:
+        raise ArgumentError(f"points has shape {stroke.shape}; pass the points of a stroke, (n, 3)")
+    if not np.isfinite(stroke).all():
+        raise ArgumentError("points has NaN or infinite coordinates; pass finite positions")
+    same = COINCIDENT * mesh.diagonal
+    kept = np.append(True, np.linalg.norm(np.diff(stroke, axis=0), axis=1) > same)
+    stroke = stroke[kept]
+    if closed and len(stroke) > 1 and np.linalg.norm(stroke[0] - stroke[-1]) <= same:
+        stroke = stroke[:-1]
+    fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
+    if len(stroke) < fewest:
+        raise ArgumentError(
+            f"points has {len(stroke)} different points; pass at least {fewest}, from one end of "
+            "the stroke to the other"
+        )
+    return stroke, within
+
+
+def fitted_points(
+    mesh: Mesh, stroke: FloatArray, tolerance: float, closed: bool, design: Curves
+) -> SurfacePoints:
+    """Few control points whose curve stays within the tolerance of a stroke.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    stroke : (n, 3) float array
+        From `checked_stroke`.
+    tolerance : float
+        In mesh units.
+    closed : bool
+    design : callable
+        Designs the curve through control points, from a start or None.
+
+    Raises
+    ------
+    ControlPointError
+        If the stroke is farther from the surface than the tolerance.
+    UnreachableError
+        If no curve stays within the tolerance of the stroke.
+    """
+    _, away = nearest_points(mesh, stroke)
+    if not away.max() <= tolerance:
+        worst = int(away.argmax())
+        raise ControlPointError(
+            f"points[{worst}] is {away[worst]:g} off the surface, more than the tolerance "
+            f"({tolerance:g}); move the stroke onto the surface, or use a greater tolerance"
+        )
+    places = _smoothed(stroke, tolerance, closed)
+    fit = _Fit(mesh, places, _sampled(stroke, tolerance, closed), tolerance, closed, design)
+    on_surface = nearest_points(mesh, places)[0]
+    normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
+    begin = _fewest_knots(places, normals, tolerance, closed)
+    found = fit.refined(begin, PLACES, MOST_ROUNDS)
+    if found is None:
+        raise UnreachableError(
+            f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
+            "which may cross itself or leave the surface; draw it again, or use a greater tolerance"
+        )
+    knots, curve = found
+    most = len(knots) - 1
+    fewer = fit.refined(_some_of(knots, closed), most, MOST_ROUNDS_FROM_START, curve)
+    checked = None if fewer is None else fit.refined(fewer[0], most, MOST_CHECKS)
+    return fit.points(knots if checked is None else checked[0])
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A stroke, its places, and how curves through some of these are designed."""
+
+    mesh: Mesh
+    places: FloatArray
+    stroke: FloatArray
+    tolerance: float
+    closed: bool
+    design: Curves
+
+    def points(self, knots: IntArray) -> SurfacePoints:
+        """The points of the surface at knots, which are indices of places."""
+        return snapped(nearest_points(self.mesh, self.places[knots])[0])
+
+    def refined(
+        self, knots: IntArray, most: int, rounds: int, start: SurfaceCurve | None = None
+    ) -> tuple[IntArray, SurfaceCurve] | None:
+        """Knots, with others added until their curve stays near the stroke, and this curve.
+
+        Parameters
+        ----------
+        knots : (k,) int array
+        most : int
+            Greatest number of knots.
+        rounds : int
+            Greatest number of curves that are designed.
+        start : SurfaceCurve, optional
+            A curve from which each curve is relaxed. Only one knot is then added at a time, since
+            that is fast; otherwise one between any two where it is needed.
+
+        Returns
+        -------
+        tuple or None
+            None if that fails.
+        """
+        for _ in range(rounds):
+            checkpoint()
+            if len(knots) > most:
+                return None
+            try:
+                curve = self.design(self.points(knots), start)
+            except (ControlPointError, UnreachableError, CurveError):
+                if start is not None:
+                    return None
+                # Two of the points may coincide, or lie on different parts.
+                missing = np.arange(0)
+            else:
+                missing = self.missing(knots, curve)
+                if not len(missing):
+                    return knots, curve
+            finer = knots
+            for place in missing if start is None else missing[:1]:
+                finer = _with_knot(finer, len(self.places), self.closed, int(place))
+            if not len(missing):
+                finer = _with_knot(knots, len(self.places), self.closed, None)
+            if len(finer) == len(knots):
+                return None
+            knots = finer
+        return None
+
+    def missing(self, knots: IntArray, curve: SurfaceCurve) -> IntArray:
+        """The places between knots where a curve is too far from the stroke, the worst first.
+
+        There is at most one between any two knots.
+        Distances count from the curve to the stroke and from the stroke to the curve.
+        """
+        line = _sampled(curve.points, self.tolerance, curve.closed)
+        both = np.concatenate([self.stroke, line])
+        away = np.concatenate(
+            [cKDTree(line).query(self.stroke)[0], cKDTree(self.stroke).query(line)[0]]
+        )
+        far = np.flatnonzero(away > self.tolerance)
+        far = far[np.argsort(-away[far], kind="stable")]
+        place = cKDTree(self.places).query(both[far])[1]
+        gap = np.searchsorted(knots, place, side="right") % (len(knots) if self.closed else PLACES)
+        _, first = np.unique(gap, return_index=True)
+        found: IntArray = place[np.sort(first)]
+        return found
+
+
+def _some_of(knots: IntArray, closed: bool) -> IntArray:
+    """Some of the knots, with both ends of an open curve."""
+    fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
+    count = max(fewest, len(knots) // SPARSE)
+    chosen = np.linspace(0, len(knots) - (not closed), count, endpoint=not closed)
+    return knots[np.unique(chosen.astype(np.int64))]
+
+
+def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
+    """Places on a smooth line near a stroke, evenly spaced, (m, 3).
+
+    A closed line ends before its first place.
+    """
+    line = np.concatenate([stroke, stroke[:1]]) if closed else stroke
+    degree = min(3, len(line) - 1)
+    squares = len(line) * (SMOOTHING * tolerance) ** 2
+    spline, _ = splprep(line.T, s=squares, k=degree, per=closed)
+    share = np.linspace(0.0, 1.0, 4 * PLACES)
+    fine = np.stack(splev(share, spline), axis=1)
+    arcs = _arcs(fine)
+    wanted = np.linspace(0.0, arcs[-1], PLACES, endpoint=not closed)
+    return np.stack([np.interp(wanted, arcs, fine[:, axis]) for axis in range(3)], axis=1)
+
+
+def _arcs(line: FloatArray) -> FloatArray:
+    """Length of a polyline up to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def _fewest_knots(
+    places: FloatArray, normals: FloatArray, tolerance: float, closed: bool
+) -> IntArray:
+    """Places whose cubic spline stays near all of them.
+
+    They are added where it is farthest, and then removed where that is possible. Distances along
+    the normals of the surface do not count, since the curve bends with the surface by itself.
+    """
+    m = len(places)
+    knots = np.array([0, m // 3, 2 * m // 3] if closed else [0, m - 1])
+    within = MARGIN * tolerance
+    while True:
+        away = _off_spline(places, normals, knots, tolerance, closed)
+        if away.max() <= within:
+            break
+        finer = _with_knot(knots, m, closed, int(away.argmax()))
+        if len(finer) == len(knots):
+            break
+        knots = finer
+    fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
+    for knot in knots[1:] if closed else knots[1:-1]:
+        fewer = knots[knots != knot]
+        if len(fewer) >= fewest and (
+            _off_spline(places, normals, fewer, tolerance, closed).max() <= within
+        ):
+            knots = fewer
+    return knots
+
+
+def _with_knot(knots: IntArray, m: int, closed: bool, wanted: int | None) -> IntArray:
+    """Knots with another one at or near a wanted place, or in the middle of the widest gap.
+
+    They stay as they are if there is no room for another one.
+    """
+    ends = np.append(knots, knots[0] + m) if closed else knots
+    gap = int(np.diff(ends).argmax())
+    if wanted is not None:
+        gap = min(int(np.searchsorted(ends, wanted, side="right")) - 1, len(ends) - 2)
+    low, high = int(ends[gap]), int(ends[gap + 1])
+    if high - low < 2 * APART:
+        gap = int(np.diff(ends).argmax())
+        low, high = int(ends[gap]), int(ends[gap + 1])
+        wanted = None
+        if high - low < 2 * APART:
+            return knots
+    place = (low + high) // 2 if wanted is None else wanted
+    place = min(max(place, low + APART), high - APART)
+    return np.sort(np.append(knots, place % m))
+
+
+def _off_spline(
+    places: FloatArray, normals: FloatArray, knots: IntArray, tolerance: float, closed: bool
+) -> FloatArray:
+    """Distance of each place from the cubic spline through knots, (m,), across the normals."""
+    chosen = places[knots]
+    if closed:
+        chosen = np.concatenate([chosen, chosen[:1]])
+    lengths = np.linalg.norm(np.diff(chosen, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(np.maximum(lengths, np.finfo(float).tiny))])
+    kind = "periodic" if closed else "natural"
+    spline = CubicSpline(along, chosen, bc_type=kind) if len(chosen) > 2 else None
+    count = int(np.clip(along[-1] / (DENSE * tolerance), 2 * len(places), MOST_SAMPLES))
+    share = np.linspace(0.0, along[-1], count)
+    line = (
+        spline(share)
+        if spline is not None
+        else chosen[0] + (share / along[-1])[:, None] * (chosen[1] - chosen[0])
+    )
+    way = line[cKDTree(line).query(places)[1]] - places
+    way -= (way * normals).sum(axis=1, keepdims=True) * normals
+    found: FloatArray = np.linalg.norm(way, axis=1)
+    return found
+
+
+def _sampled(line: FloatArray, tolerance: float, closed: bool) -> FloatArray:
+    """Points of a polyline that are much closer to each other than the tolerance."""
+    whole = np.concatenate([line, line[:1]]) if closed else line
+    arcs = _arcs(whole)
+    count = int(np.clip(arcs[-1] / (DENSE * tolerance), len(whole), MOST_SAMPLES))
+    at = np.union1d(np.linspace(0.0, arcs[-1], count), arcs)
+    return np.stack([np.interp(at, arcs, whole[:, axis]) for axis in range(3)], axis=1)

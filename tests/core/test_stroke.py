@@ -1,0 +1,117 @@
+"""Tests control points that are fitted to strokes."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.geometry.curve import resample
+from nicmm_core.geometry.surface_points import nearest_points
+from tests.core.checks import random_surface_points
+
+SAMPLES = 300
+
+
+def stroke_of(curve, noise, seed=0):
+    """Samples of a curve, each moved at random by up to the noise."""
+    points, _ = resample(curve.points, SAMPLES, curve.closed)
+    moves = np.random.default_rng(seed).normal(size=points.shape)
+    moves *= (
+        noise
+        * np.random.default_rng(seed + 1).random((len(points), 1))
+        / np.linalg.norm(moves, axis=1, keepdims=True)
+    )
+    return points + moves
+
+
+def farthest(curve, stroke):
+    """Greatest distance between a curve and a stroke, in both directions."""
+    dense, _ = resample(curve.points, 20 * SAMPLES, curve.closed)
+    other, _ = resample(stroke, 20 * SAMPLES, curve.closed)
+    return max(cKDTree(dense).query(other)[0].max(), cKDTree(other).query(dense)[0].max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("name", ["ball", "body", "ring"])
+def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
+    mesh = request.getfixturevalue(name)
+    points = random_surface_points(mesh, 4, seed)
+    curve = nicmm.design_curve(mesh, points, closed=closed, order="shortest").curves[0]
+    noise = 0.01 * mesh.diagonal
+    stroke = stroke_of(curve, noise, seed)
+    fitted = nicmm.fit_stroke(mesh, stroke, 2.0 * noise, closed=closed)
+    # At most half of those that every tenth sample would need.
+    assert 2 + closed <= len(fitted) <= SAMPLES // 20
+    found = nicmm.design_curve(mesh, fitted, closed=closed).curves[0]
+    assert farthest(found, stroke) <= 2.0 * noise * 1.001
+
+
+def test_a_stroke_without_noise_is_followed_closely(ball):
+    curve = nicmm.design_curve(ball, [5, 200, 400], closed=False).curves[0]
+    tolerance = 1e-3 * ball.diagonal
+    fitted = nicmm.fit_stroke(ball, curve.points, tolerance)
+    found = nicmm.design_curve(ball, fitted, closed=False).curves[0]
+    assert farthest(found, curve.points) <= tolerance * 1.001
+    assert np.linalg.norm(fitted[0] - curve.points[0]) <= tolerance
+    assert np.linalg.norm(fitted[-1] - curve.points[-1]) <= tolerance
+
+
+def test_a_smaller_tolerance_takes_more_points():
+    mesh = shapes.sphere(4)
+    angle = np.linspace(0.0, 4.0, 400)
+    height = 0.3 * np.sin(5.0 * angle)
+    circle = np.sqrt(1.0 - height**2)
+    wave = np.stack([circle * np.cos(angle), circle * np.sin(angle), height], axis=1)
+    coarse, fine = (len(nicmm.fit_stroke(mesh, wave, each)) for each in (0.1, 0.01))
+    assert coarse < fine
+
+
+def test_a_short_straight_stroke_has_two_points(ball):
+    start, end = ball.vertices[[5, 60]]
+    line = start + np.linspace(0.0, 1.0, 50)[:, None] * (end - start)
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    assert len(nicmm.fit_stroke(ball, line, 0.05)) == 2
+
+
+def test_the_same_stroke_gives_the_same_points(body):
+    curve = nicmm.design_curve(body, random_surface_points(body, 3, 1), closed=False).curves[0]
+    stroke = stroke_of(curve, 0.01 * body.diagonal)
+    one, other = (nicmm.fit_stroke(body, stroke, 0.02 * body.diagonal) for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_points_on_the_surface_are_returned(body):
+    curve = nicmm.design_curve(body, random_surface_points(body, 3, 1), closed=False).curves[0]
+    fitted = nicmm.fit_stroke(body, stroke_of(curve, 0.01 * body.diagonal), 0.02 * body.diagonal)
+    assert nearest_points(body, fitted)[1].max() < 1e-9 * body.diagonal
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"tolerance": 0.0}, nicmm.ArgumentError, "tolerance is 0.0"),
+        ({"tolerance": np.nan}, nicmm.ArgumentError, "tolerance is nan"),
+        ({"points": np.zeros((5, 2))}, nicmm.ArgumentError, "shape \\(5, 2\\)"),
+        ({"points": np.full((5, 3), np.inf)}, nicmm.ArgumentError, "NaN or infinite"),
+        ({"points": np.zeros((5, 3))}, nicmm.ArgumentError, "1 different points"),
+        ({"points": "line"}, nicmm.ArgumentError, "cannot be read as numbers"),
+        ({"points": [[3.0, 0.0, 0.0], [0.0, 3.0, 0.0]]}, nicmm.ControlPointError, "off the surf"),
+        ({"closed": 2}, nicmm.ArgumentError, "closed is 2"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(ball, given, error, words):
+    arguments = {"points": ball.vertices[[5, 60, 100]], "tolerance": 0.1, **given}
+    with pytest.raises(error, match=words):
+        nicmm.fit_stroke(ball, **arguments)
+
+
+def test_a_stroke_from_one_part_to_another_is_refused():
+    one = shapes.sphere(2)
+    faces = np.concatenate([one.faces, one.faces + len(one.vertices)])
+    mesh = nicmm.Mesh(np.concatenate([one.vertices, one.vertices + [2.2, 0.0, 0.0]]), faces)
+    line = np.stack([np.linspace(-0.9, 3.1, 80), np.zeros(80), np.zeros(80)], axis=1)
+    line[:, 2] = np.sqrt(np.maximum(1.0 - np.minimum(line[:, 0] ** 2, (line[:, 0] - 2.2) ** 2), 0))
+    with pytest.raises(nicmm.UnreachableError, match="no curve was found"):
+        nicmm.fit_stroke(mesh, line, 0.15)
