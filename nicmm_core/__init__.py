@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .design import Designer as Designer
     from .design import design_curve as design_curve
+    from .design import feature_loop as feature_loop
     from .design import fit_stroke as fit_stroke
     from .design import mirrored as mirrored
     from .design import offset_curve as offset_curve
@@ -47,6 +48,7 @@ _NAMES = {
     "design": (
         "Designer",
         "design_curve",
+        "feature_loop",
         "fit_stroke",
         "mirrored",
         "offset_curve",

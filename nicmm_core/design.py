@@ -42,6 +42,7 @@ from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design, with_curves_of_designs
 from .displaced_start import is_uneven
 from .errors import ArgumentError, CurveError, UnreachableError
+from .feature_lines import feature_line
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of
 from .geometry.mesh import Mesh
@@ -342,6 +343,18 @@ class Designer:
             return only_curve(found, "design")
 
         return fitted_points(self.mesh, stroke, within, bool(closed), design)
+
+    def feature_loop(
+        self,
+        point: ArrayLike | SurfacePoints,
+        edges: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        reach: float | None = None,
+    ) -> tuple[SurfacePoints, bool]:
+        """The control points that `feature_loop` finds, and whether the line is closed."""
+        line = feature_line(self.mesh, point, edges, weights, reach)
+        points = self.fit_stroke(line.points, line.tolerance, line.closed)
+        return points, line.closed
 
     def measures(
         self,
@@ -788,4 +801,59 @@ def fit_stroke(
     True
     """
     found = Designer(mesh).fit_stroke(points, tolerance, closed)
+    return found.positions(mesh)
+
+
+def feature_loop(
+    mesh: Mesh,
+    point: ArrayLike | SurfacePoints,
+    *,
+    edges: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    reach: float | None = None,
+) -> FloatArray:
+    """Control points of the closed loop along the feature next to a point.
+
+    A feature is a sharp edge, a boundary, a smooth ridge or valley, marked edges, or the rim of a
+    painted region. Where no loop follows it, they are those of the open line along it;
+    `Designer.feature_loop` also tells which of both it is.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    point : (1,) int array_like, (1, 3) float array_like or SurfacePoints
+        A point on the surface near the feature; a vertex index or a position may be given alone.
+    edges : (n, 2) int array_like, optional
+        Vertices of marked edges, which are followed first.
+    weights : (V,) float array_like, optional
+        Weights at the vertices; the rim of the region with more than half is followed next.
+    reach : float, optional
+        Distance from the point within which the feature is looked for, by default four edges.
+
+    Returns
+    -------
+    (k, 3) float array
+        Control points on the surface, for `design_curve`. Its curve stays within a third of an edge
+        of the feature.
+
+    Raises
+    ------
+    ControlPointError
+        If the point is not one point on the surface.
+    UnreachableError
+        If there is no feature within reach, or no curve was found that follows it.
+    ArgumentError
+        If another argument cannot be used.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.annulus()
+    >>> rim = nicmm.feature_loop(mesh, [0.31, 0.0, 0.0])
+    >>> design = nicmm.design_curve(mesh, rim)
+    >>> design.curves[0].closed
+    True
+    """
+    found, _ = Designer(mesh).feature_loop(point, edges, weights, reach)
     return found.positions(mesh)

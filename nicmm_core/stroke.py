@@ -36,8 +36,9 @@ SMOOTHING = 0.35
 """Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
 this size is removed."""
 
-PLACES = 400
-"""Number of places on the smoothed stroke among which control points are chosen."""
+PLACES, MOST_PLACES = 400, 3000
+"""Least and greatest number of places on the smoothed stroke among which control points are chosen.
+They are at most half a tolerance apart, if that is possible."""
 
 MARGIN = 0.6
 """Distance that the spline of the first step keeps from the smoothed stroke, in tolerances. The
@@ -139,7 +140,7 @@ def fitted_points(
     on_surface = nearest_points(mesh, places)[0]
     normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
     begin = _fewest_knots(places, normals, tolerance, closed)
-    found = fit.refined(begin, PLACES, MOST_ROUNDS)
+    found = fit.refined(begin, len(places), MOST_ROUNDS)
     if found is None:
         raise UnreachableError(
             f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
@@ -227,7 +228,8 @@ class _Fit:
         far = np.flatnonzero(away > self.tolerance)
         far = far[np.argsort(-away[far], kind="stable")]
         place = cKDTree(self.places).query(both[far])[1]
-        gap = np.searchsorted(knots, place, side="right") % (len(knots) if self.closed else PLACES)
+        gap = np.searchsorted(knots, place, side="right")
+        gap %= len(knots) if self.closed else len(self.places)
         _, first = np.unique(gap, return_index=True)
         found: IntArray = place[np.sort(first)]
         return found
@@ -250,10 +252,11 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
     degree = min(3, len(line) - 1)
     squares = len(line) * (SMOOTHING * tolerance) ** 2
     spline, _ = splprep(line.T, s=squares, k=degree, per=closed)
-    share = np.linspace(0.0, 1.0, 4 * PLACES)
+    share = np.linspace(0.0, 1.0, 4 * MOST_PLACES)
     fine = np.stack(splev(share, spline), axis=1)
     arcs = _arcs(fine)
-    wanted = np.linspace(0.0, arcs[-1], PLACES, endpoint=not closed)
+    count = int(np.clip(2.0 * arcs[-1] / tolerance, PLACES, MOST_PLACES))
+    wanted = np.linspace(0.0, arcs[-1], count, endpoint=not closed)
     return np.stack([np.interp(wanted, arcs, fine[:, axis]) for axis in range(3)], axis=1)
 
 
