@@ -35,6 +35,7 @@ from .tool import (
     overlay,
     picking,
     point_operators,
+    stroke_operators,
     toolbar,
 )
 
@@ -55,6 +56,7 @@ MODULES = (
     curve_settings,
     edit_operator,
     point_operators,
+    stroke_operators,
     draw_operator,
     course_choice,
     picking,

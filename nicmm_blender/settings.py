@@ -348,6 +348,42 @@ def with_options(
     return given.function(**{**given.keywords, "options": options})
 
 
+TOOL = {
+    "tool_action": EnumProperty(
+        name="Click",
+        description="What clicking on the surface with the Surface Curve tool does",
+        items=(
+            ("POINTS", "Points", "Add control points", "CURVE_PATH", 0),
+            (
+                "FREEHAND",
+                "Freehand",
+                "Draw a stroke, which becomes a curve with few control points. A stroke from the "
+                "active curve to itself redraws the stretch between",
+                "GREASEPENCIL",
+                1,
+            ),
+            (
+                "FEATURE",
+                "Feature",
+                "Create the curve along the ridge, valley, sharp edge or boundary that is clicked",
+                "MOD_EDGESPLIT",
+                2,
+            ),
+        ),
+        default="POINTS",
+    ),
+    "stroke_tolerance": FloatProperty(
+        name="Tolerance",
+        description="Greatest distance between a stroke and its curve, in pixels",
+        default=8.0,
+        min=1.0,
+        soft_max=50.0,
+        subtype="PIXEL",
+    ),
+}
+"""Settings of the tool alone."""
+
+
 class NICMM_PG_settings(bpy.types.PropertyGroup):
     """Settings of the sidebar panel, saved with the scene."""
 
@@ -356,6 +392,7 @@ class NICMM_PG_settings(bpy.types.PropertyGroup):
         for name, given in {
             **DesignProperties.__annotations__,
             **OutputProperties.__annotations__,
+            **TOOL,
             "tube": _tube_property(not sticky_curves.are_drawn_with_all_points()),
         }.items()
     }

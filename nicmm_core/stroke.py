@@ -36,6 +36,9 @@ SMOOTHING = 0.35
 """Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
 this size is removed."""
 
+AT_ENDS = 10.0
+"""Weight of the ends of an open stroke, relative to its other points, when it is smoothed."""
+
 PLACES, MOST_PLACES = 400, 3000
 """Least and greatest number of places on the smoothed stroke among which control points are chosen.
 They are at most half a tolerance apart, if that is possible."""
@@ -251,7 +254,10 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
     line = np.concatenate([stroke, stroke[:1]]) if closed else stroke
     degree = min(3, len(line) - 1)
     squares = len(line) * (SMOOTHING * tolerance) ** 2
-    spline, _ = splprep(line.T, s=squares, k=degree, per=closed)
+    weights = np.ones(len(line))
+    if not closed:
+        weights[[0, -1]] = AT_ENDS
+    spline, _ = splprep(line.T, w=weights, s=squares, k=degree, per=closed)
     share = np.linspace(0.0, 1.0, 4 * MOST_PLACES)
     fine = np.stack(splev(share, spline), axis=1)
     arcs = _arcs(fine)

@@ -216,17 +216,31 @@ def open_curve(
     """
     mesh_object, before = _mesh_and_settings(context, edited)
     settings = before if settings is None else settings
+    remarks: list[str] = []
+    if edited is not None:
+        settings = _without_missing_maps(mesh_object, settings, remarks)
+    opened = _opened_on(mesh_object, edited, settings, remarks)
+    if edited is not None:
+        kept = _settings_that_keep_the_curve(before, settings, keeps_course)
+        opened = _with_recorded_points(opened, edited, kept == before, remarks)
+    return replace(opened, remark="".join(f"; {each}" for each in remarks))
+
+
+def _opened_on(
+    mesh_object: bpy.types.Object,
+    edited: bpy.types.Object | None,
+    settings: CurveSettings,
+    remarks: list[str],
+) -> Opened:
+    """A mesh opened for a curve, or for a new one, without control points; it may add a remark."""
     surface = surface_cache.get(mesh_object, settings.use_modifiers)
     if not len(surface.faces):
         raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
-    remarks = []
     beyond = active_modifiers_text(mesh_object)
     if beyond and not settings.use_modifiers:
         remarks.append(f"on the mesh without its {beyond}")
-    if edited is not None:
-        settings = _without_missing_maps(mesh_object, settings, remarks)
     via, elastic = no_via_points(), replace(settings, method="ELASTIC")
-    opened = Opened(
+    return Opened(
         curve_uid=0 if edited is None else edited.session_uid,
         mesh_uid=mesh_object.session_uid,
         surface=surface,
@@ -238,10 +252,15 @@ def open_curve(
         mirror=mirror_plane.mirror_of(mesh_object, surface, settings),
         others=avoided_curves.above(edited, mesh_object, surface, elastic),
     )
-    if edited is not None:
-        kept = _settings_that_keep_the_curve(before, settings, keeps_course)
-        opened = _with_recorded_points(opened, edited, kept == before, remarks)
-    return replace(opened, remark="".join(f"; {each}" for each in remarks))
+
+
+def open_new(context: bpy.types.Context) -> Opened:
+    """Open the active mesh, or that of the active curve, for a new curve."""
+    mesh_object = curve_record.mesh_of_context(context)
+    if mesh_object is None:
+        raise InputError("Make a mesh or a designed curve active")
+    panel = curve_record.settings_from(context.scene.nicmm_curves)
+    return _opened_on(mesh_object, None, replace(panel, method="ELASTIC"), [])
 
 
 def _mesh_and_settings(

@@ -85,6 +85,11 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
         hit = picking.under_mouse(context, self._pixel)
         if hit is None:
             return PASS
+        if not (self.remove or self.via):
+            stroke = _call_of_action(context.scene.nicmm_curves.tool_action, hit)
+            if stroke is not None:
+                operator, arguments = stroke
+                return called(self, operator, "INVOKE_DEFAULT", **arguments)
         call = _call_of(hit, self.remove, self.via)
         if call is None:
             return PASS
@@ -92,6 +97,18 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
         if "from_mouse" in arguments:
             arguments["from_mouse"] = self._is_down
         return called(self, operator, "INVOKE_DEFAULT", **arguments)
+
+
+def _call_of_action(
+    action: str, hit: picking.Hit
+) -> tuple[Callable[..., set[str]], dict[str, object]] | None:
+    """The operator for a stroke, or for a curve along a feature; None for single points."""
+    beside = {Kind.SURFACE, Kind.JUNCTION, Kind.CURVE}
+    if action == "FREEHAND" and hit.kind in beside | {Kind.LINE}:
+        return bpy.ops.nicmm.draw_stroke, {}
+    if action == "FEATURE" and hit.kind in beside:
+        return bpy.ops.nicmm.feature_curve, {"position": hit.position}
+    return None
 
 
 def _call_of(

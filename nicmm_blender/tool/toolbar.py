@@ -76,6 +76,10 @@ class _SurfaceCurve:
     ) -> None:
         """Draw the settings of the active curve, or of a new one, in the header."""
         curve = edited_curve.active(context)
+        tool = context.scene.nicmm_curves
+        layout.prop(tool, "tool_action", expand=True, icon_only=True)
+        if tool.tool_action == "FREEHAND":
+            layout.prop(tool, "stroke_tolerance")
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)
             layout.operator(NICMM_OT_next_course.bl_idname)

@@ -78,6 +78,14 @@ class View:
         (near,), (direction,) = self.rays(np.asarray(pixel, dtype=np.float64)[None])
         return near, direction
 
+    def pixel_size(self, position: np.ndarray) -> float:
+        """Width of a pixel at the depth of a position, (3,), in local space."""
+        pixel = self.project(position[None])[0]
+        near, direction = self.rays(np.array([pixel, pixel + [1.0, 0.0]]))
+        share = np.linalg.norm(position - near[0]) / np.linalg.norm(direction[0])
+        places = near + share * direction
+        return float(np.linalg.norm(places[1] - places[0]))
+
     def surface_point_at(self, pixel: np.ndarray) -> SurfacePoints | None:
         """The visible point of the surface under a pixel, as a point of the core, or None."""
         from ...nicmm_core.geometry.surface_points import first_hits

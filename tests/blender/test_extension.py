@@ -143,7 +143,10 @@ def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
     of_scripts = {"points", "point_group", "corners", "via_points"}
-    assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
+    of_tool = {"tool_action", "stroke_tolerance"}
+    assert (
+        set(settings) - {"rna_type", "name"} - of_tool == set(operator) - {"rna_type"} - of_scripts
+    )
 
 
 @pytest.mark.slow

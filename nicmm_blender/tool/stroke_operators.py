@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Freehand strokes: drawn with the tool, or as operators for scripts, and curves along features."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ..operators.error_reports import called, with_error_reports
+from ..operators.partial_curve import PartialCurve
+from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
+from ..scene import surface_cache
+from ..scene.control_points import ControlPoints
+from ..scene.messages import InputError, check_finite
+from ..scene.surface import group_weights
+from ..scene.via_points import no_via_points
+from ..scene.viewports import NAVIGATION
+from ..settings import CURVE
+from . import picking
+from .changes_points import ChangesPoints
+from .edit_operator import NICMM_PG_control_point
+from .picking import Kind
+from .point_operators import POSITION
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfacePoints
+
+CLOSING = 16.0
+"""Distance in pixels, at a scale of 1, between the ends of a stroke that is closed."""
+
+LONG = 4.0
+"""Least length of a stroke that is closed, in such distances."""
+
+FEWEST = 2
+"""Least number of places of a stroke."""
+
+HINT = "Release: Create Curve   |   Esc, Right Mouse: Cancel"
+
+
+class NICMM_OT_stroke_curve(ChangesPoints, bpy.types.Operator):
+    """Create a curve with few control points that follows a stroke, or redraw a stretch of one"""
+
+    bl_idname = "nicmm.stroke_curve"
+    bl_label = "Curve from Stroke"
+    bl_options = {"REGISTER", "UNDO"}
+
+    curve: CURVE
+    points: bpy.props.CollectionProperty(
+        name="Points",
+        description="Points of the stroke, in the local space of the mesh object",
+        type=NICMM_PG_control_point,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Greatest distance between the stroke and the curve",
+        default=0.05,
+        min=0.0,
+        soft_max=1.0,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+    closed: bpy.props.BoolProperty(
+        name="Closed",
+        description="Join the end of the stroke to its beginning. A stroke that redraws a stretch "
+        "of a curve is open",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    redraw: bpy.props.BoolProperty(
+        name="Redraw Stretch",
+        description="Replace the stretch of the curve between the ends of the stroke",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def open_curve(self, context: bpy.types.Context) -> Opened:
+        chosen = edited_curve.chosen(context, self.curve) if self.redraw else None
+        if chosen is None and self.redraw:
+            raise InputError("Make a designed curve active to redraw a stretch of it")
+        return _opened_for(context, chosen)
+
+    def edited(self, opened: Opened) -> Opened:
+        check_finite("tolerance", self.tolerance)
+        stroke = np.array([point.position[:] for point in self.points], dtype=float).reshape(-1, 3)
+        if len(stroke) < FEWEST:
+            raise InputError("The stroke has fewer than two points. Draw a longer one")
+        stroke = stroke @ opened.surface.local_to_core.T
+        within = self.tolerance / opened.surface.unit
+        closed = self.closed and not self.redraw
+        with surface_cache.designer_of(opened.surface) as designer:
+            found = designer.fit_stroke(stroke, within, closed)
+        if self.redraw:
+            return _with_stretch(opened, found, stroke)
+        return _through(opened, found, closed)
+
+
+class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
+    """Create the closed curve along the ridge, valley, sharp edge or boundary next to a point.
+
+    If the feature has an end, the curve is open.
+    """
+
+    bl_idname = "nicmm.feature_curve"
+    bl_label = "Curve along Feature"
+    bl_description = (
+        "Create the closed curve along the ridge, valley, sharp edge or boundary next to a point, "
+        "or an open one if the feature has an end"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    position: POSITION
+    use_map: bpy.props.BoolProperty(
+        name="Rim of Map",
+        description="Follow the rim of the alignment map of the sidebar, if there is one",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    reach: bpy.props.FloatProperty(
+        name="Reach",
+        description="Distance from the point within which the feature is looked for. If zero, it "
+        "is a few edges of the mesh",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+
+    def open_curve(self, context: bpy.types.Context) -> Opened:
+        self._map = context.scene.nicmm_curves.alignment_group if self.use_map else ""
+        if self.use_map and not self._map:
+            raise InputError("There is no alignment map. Choose one in the sidebar")
+        return _opened_for(context, None)
+
+    def edited(self, opened: Opened) -> Opened:
+        check_finite("reach", self.reach)
+        surface = opened.surface
+        given = np.array([self.position[:]], dtype=float)
+        place = edited_curve.nearest_surface_points(opened, given)
+        reach = self.reach / surface.unit if self.reach else None
+        weights = None
+        if self._map:
+            weights = group_weights(opened.mesh_object, self._map, surface.with_modifiers)
+        with surface_cache.designer_of(surface) as designer:
+            found, closed = designer.feature_loop(place, weights=weights, reach=reach)
+        return _through(opened, found, closed)
+
+
+def _opened_for(context: bpy.types.Context, curve: bpy.types.Object | None) -> Opened:
+    """A curve, or the mesh of the active object for a new curve."""
+    if curve is not None:
+        return edited_curve.open_curve(context, curve)
+    return edited_curve.open_new(context)
+
+
+def _through(opened: Opened, places: SurfacePoints, closed: bool) -> Opened:
+    """A new curve through points."""
+    points = ControlPoints(places, np.zeros(len(places), dtype=bool))
+    settings = opened.settings.with_value("closed", closed)
+    return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)
+
+
+def _with_stretch(opened: Opened, places: SurfacePoints, stroke: np.ndarray) -> Opened:
+    """A curve with a stretch replaced by the points of a stroke."""
+    from ...nicmm_core.geometry.surface_points import joined
+    from ...nicmm_core.stretch import stretch_between
+
+    if opened.curve is None:
+        raise InputError("The curve has to be designed first. Run Update Curves")
+    if opened.mirror is not None and opened.mirror.joined:
+        raise InputError(
+            "A stretch of a curve that is joined to its mirror image cannot be redrawn. Draw a new "
+            "curve, or set Mirror to None"
+        )
+    mesh = surface_cache.core_mesh(opened.surface)
+    kept = stretch_between(mesh, opened.curve, stroke[0], stroke[-1])
+    if kept.reversed:
+        places = places[np.arange(len(places))[::-1]]
+    before, after = opened.points.places[kept.before], opened.points.places[kept.after]
+    corners = opened.points.corners
+    points = ControlPoints(
+        joined([before, places, after]),
+        np.concatenate(
+            [corners[kept.before], np.zeros(len(places), dtype=bool), corners[kept.after]]
+        ),
+    )
+    return replace(opened, points=points, via=no_via_points(), curve=None)
+
+
+class NICMM_OT_draw_stroke(bpy.types.Operator):
+    """Draw a stroke on the surface while the mouse button is pressed"""
+
+    bl_idname = "nicmm.draw_stroke"
+    bl_label = "Draw Stroke on Surface"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return with_error_reports(self, lambda: self._begin(context, event))
+
+    def _begin(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self._opened = picking.opened_now(context)
+        self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
+        self._positions: list[np.ndarray] = []
+        self._pixels: list[np.ndarray] = []
+        self._from = picking.under_mouse(context, picking.pixel_of(event))
+        self._shown = PartialCurve()
+        self._add(picking.pixel_of(event))
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set(f"{self.bl_label}   |   {HINT}")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "MOUSEMOVE":
+            self._add(picking.pixel_of(event))
+        elif event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
+            self._end(context)
+            return {"CANCELLED"}
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._end(context)
+            return with_error_reports(self, lambda: self._finish(context, event))
+        elif event.type in NAVIGATION:
+            return {"RUNNING_MODAL"}  # the pixels of the stroke belong to this view
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Called by Blender when it ends the operator, for example when it quits."""
+        self._end(context)
+
+    def _add(self, pixel: np.ndarray) -> None:
+        """Add the place under the mouse to the stroke."""
+        place = self._view.surface_point_at(pixel)
+        if place is None:
+            return
+        surface = self._opened.surface
+        self._positions.append(surface.points(place.faces, place.barycentric)[0])
+        self._pixels.append(pixel)
+        line = np.array(self._positions)
+        to_world = surface.local_to_world
+        self._shown.show(line @ to_world[:3, :3].T + to_world[:3, 3], closed=False)
+
+    def _end(self, context: bpy.types.Context) -> None:
+        self._shown.remove()
+        context.workspace.status_text_set(None)
+
+    def _finish(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if len(self._positions) < FEWEST:
+            return {"CANCELLED"}
+        scale = context.preferences.system.ui_scale
+        pixels, line = np.array(self._pixels), np.array(self._positions)
+        length = np.linalg.norm(np.diff(pixels, axis=0), axis=1).sum()
+        gap = np.linalg.norm(pixels[-1] - pixels[0])
+        closed = gap <= CLOSING * scale and length >= LONG * CLOSING * scale
+        onto = picking.under_mouse(context, picking.pixel_of(event))
+        on_curve = {Kind.LINE, Kind.POINT}
+        redraw = all(hit is not None and hit.kind in on_curve for hit in (self._from, onto))
+        properties = context.scene.nicmm_curves
+        pixel = self._view.pixel_size(line[len(line) // 2]) * self._opened.surface.scale
+        return called(
+            self,
+            bpy.ops.nicmm.stroke_curve,
+            "INVOKE_DEFAULT",
+            points=[{"name": "", "position": tuple(place)} for place in line],
+            tolerance=properties.stroke_tolerance * scale * pixel,
+            closed=bool(closed),
+            redraw=bool(redraw),
+        )
+
+
+CLASSES = (NICMM_OT_stroke_curve, NICMM_OT_feature_curve, NICMM_OT_draw_stroke)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,113 @@
+"""Curves from strokes and along features, in the installed extension."""
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender import scenes
+
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
+
+@pytest.fixture
+def ball(empty_scene):
+    return scenes.sphere(4)
+
+
+def on_ball(angles, heights):
+    """Positions on the unit sphere."""
+    radius = np.sqrt(1.0 - heights**2)
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), heights], axis=1)
+
+
+def as_points(positions):
+    return [{"name": "", "position": tuple(place)} for place in positions]
+
+
+def control_points(extension, curve):
+    """Positions of the control points of a curve."""
+    record = scenes.module(extension, "scene.curve_record")
+    surface = record.surface_of(curve, curve.parent)
+    points, _ = record.read_control_points(curve, surface)
+    return surface.points(points.faces, points.barycentric)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_stroke_becomes_a_curve_with_few_points(extension, ball, closed):
+    angles = np.linspace(0.0, 6.2 if closed else 3.0, 200)
+    stroke = on_ball(angles, 0.3 * np.sin(2.0 * angles))
+    assert bpy.ops.nicmm.stroke_curve(points=as_points(stroke), tolerance=0.06, closed=closed) == {
+        "FINISHED"
+    }
+    curve = bpy.context.active_object
+    assert curve is not ball and curve.data.splines[0].use_cyclic_u == closed
+    assert scenes.distances_to(stroke, scenes.points(curve)).max() < 0.08
+    assert 3 <= len(control_points(extension, curve)) <= 20
+
+
+def test_a_stroke_redraws_a_stretch_and_nothing_else(extension, ball):
+    vertices = scenes.ring(ball, 8)
+    scenes.select(ball, vertices)
+    assert bpy.ops.nicmm.design_curve(order="GIVEN") == {"FINISHED"}
+    curve = bpy.context.active_object
+    before = control_points(extension, curve)
+    angles = np.linspace(0.3, 2.0, 80)
+    bump = 0.4 * np.sin((angles - 0.3) / 1.7 * np.pi)
+    stroke = on_ball(angles, bump)
+    assert bpy.ops.nicmm.stroke_curve(points=as_points(stroke), tolerance=0.06, redraw=True) == {
+        "FINISHED"
+    }
+    after = control_points(extension, curve)
+    kept = scenes.distances_to(before, after) < 1e-6
+    gone = np.arctan2(before[:, 1], before[:, 0])
+    assert (kept == ~((gone > 0.3) & (gone < 2.0))).all()
+    line = scenes.points(curve)
+    assert line[:, 2].max() > 0.33
+    assert len(scenes.curves()) == 1
+
+
+def test_a_stroke_off_the_surface_is_an_error(ball):
+    with pytest.raises(RuntimeError, match="off the surface"):
+        bpy.ops.nicmm.stroke_curve(points=as_points([(3, 0, 0), (0, 3, 0)]), tolerance=0.1)
+    assert not scenes.curves()
+
+
+def test_a_curve_along_the_edge_of_a_cylinder(extension, empty_scene):
+    bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=1.0, depth=1.0)
+    body = bpy.context.active_object
+    assert bpy.ops.nicmm.feature_curve(position=(0.99, 0.05, 0.5), reach=0.2) == {"FINISHED"}
+    curve = bpy.context.active_object
+    assert curve is not body and curve.data.splines[0].use_cyclic_u
+    line = scenes.points(curve)
+    np.testing.assert_allclose(line[:, 2], 0.5, atol=0.03)
+    np.testing.assert_allclose(np.linalg.norm(line[:, :2], axis=1), 1.0, atol=0.03)
+    assert len(control_points(extension, curve)) < 30
+
+
+def test_a_curve_along_the_rim_of_a_map(empty_scene):
+    ball = scenes.sphere(5)
+    group = ball.vertex_groups.new(name="Cap")
+    for vertex in ball.data.vertices:
+        if vertex.co.z > 0.5:
+            group.add([vertex.index], 1.0, "REPLACE")
+    bpy.context.scene.nicmm_curves.alignment_group = "Cap"
+    place = scenes.positions(ball)[scenes.nearest_vertices(ball, [(0.866, 0.0, 0.5)])[0]]
+    assert bpy.ops.nicmm.feature_curve(position=place, use_map=True) == {"FINISHED"}
+    np.testing.assert_allclose(scenes.points(bpy.context.active_object)[:, 2], 0.53, atol=0.1)
+
+
+def test_a_smooth_surface_has_no_feature(ball):
+    with pytest.raises(RuntimeError, match="no sharp edge"):
+        bpy.ops.nicmm.feature_curve(position=(1.0, 0.0, 0.0))
+    assert not scenes.curves()
+
+
+def test_the_tool_has_an_action(extension, ball):
+    settings = bpy.context.scene.nicmm_curves
+    assert settings.tool_action == "POINTS"
+    draw = scenes.module(extension, "tool.draw_operator")
+    picking = scenes.module(extension, "tool.picking")
+    hit = picking.Hit(picking.Kind.SURFACE, "", 0, (1.0, 0.0, 0.0), ball.session_uid)
+    assert draw._call_of_action("POINTS", hit) is None
+    assert draw._call_of_action("FREEHAND", hit) is not None
+    assert draw._call_of_action("FEATURE", hit)[1] == {"position": (1.0, 0.0, 0.0)}
