@@ -18,6 +18,7 @@ from .operators import (
     design_curve,
     live_update,
     maps,
+    measures,
     move_curve,
     next_course,
     sliced_operator,
@@ -27,6 +28,7 @@ from .operators import (
 from .outputs import parallel_curves
 from .scene import surface_cache
 from .tool import (
+    comb,
     course_choice,
     course_overlay,
     draw_operator,
@@ -53,6 +55,7 @@ MODULES = (
     next_course,
     maps,
     live_update,
+    measures,
     curve_settings,
     edit_operator,
     point_operators,
@@ -62,6 +65,7 @@ MODULES = (
     picking,
     overlay,
     course_overlay,
+    comb,
     hover,
     toolbar,
     curve_list,

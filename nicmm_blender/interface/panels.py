@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels in the sidebar of the 3D viewport."""
 
+import math
+from typing import Any
+
 import bpy
 
 from .. import settings
-from ..operators import curve_settings, live_update, maps
+from ..operators import curve_settings, live_update, maps, measures
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..operators.message_labels import draw_message
 from ..outputs import edited_curve, parallel_curves
 from ..scene import curve_record, mesh_data
 from . import curve_list, icons, map_rows, menus
+
+MOST_LEGS = 12
+"""Number of legs whose lengths are listed."""
 
 
 class SidebarPanel:
@@ -112,7 +118,61 @@ class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
             draw_message(self.layout, message)
 
 
-PANELS = (NICMM_PT_design_curve, NICMM_PT_maps, NICMM_PT_curves)
+class NICMM_PT_measures(SidebarPanel, bpy.types.Panel):
+    """Lengths, area, curvature and slope of the active curve"""
+
+    bl_label = "Measures"
+    bl_parent_id = "NICMM_PT_design_curve"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        curve = edited_curve.active(context)
+        return curve is not None and curve_record.has_curve(curve)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        measured = measures.of(edited_curve.active(context))
+        if measured is None:
+            layout.label(text="Measuring", icon="TIME")
+        elif measured.problem:
+            draw_message(layout, measured.problem)
+        else:
+            for values in measured.values:
+                self._draw_values(layout, context.scene, values)
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.window_manager, "nicmm_show_comb")
+        row = layout.row()
+        row.active = context.window_manager.nicmm_show_comb
+        row.prop(context.window_manager, "nicmm_comb_scale")
+
+    def _draw_values(
+        self, layout: bpy.types.UILayout, scene: bpy.types.Scene, values: dict[str, Any]
+    ) -> None:
+        column = layout.column(align=True)
+        rows = [("Length", measures.text_of(scene, values["length"]))]
+        if values["area"] is not None:
+            rows.append(("Enclosed Area", measures.text_of(scene, values["area"], 2)))
+        rows.append(("Least Radius", measures.text_of(scene, values["least_radius"])))
+        rows.append(("Greatest Slope", f"{math.degrees(values['greatest_slope']):.1f}°"))
+        if values["distance_to_obstacle"] is not None:
+            away = measures.text_of(scene, values["distance_to_obstacle"])
+            rows.append(("Distance to Obstacle", away))
+        legs = values["leg_lengths"]
+        rows += [
+            (f"Leg {number + 1}", measures.text_of(scene, length))
+            for number, length in enumerate(legs[:MOST_LEGS])
+        ]
+        for label, text in rows:
+            split = column.split(factor=0.5)
+            split.label(text=label)
+            split.label(text=text)
+        if len(legs) > MOST_LEGS:
+            column.label(text=f"… and {len(legs) - MOST_LEGS} more legs")
+
+
+PANELS = (NICMM_PT_design_curve, NICMM_PT_measures, NICMM_PT_maps, NICMM_PT_curves)
 
 
 def register() -> None:

@@ -31,7 +31,8 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
 
     remove: bpy.props.BoolProperty(
         name="Remove",
-        description="Remove the point or the via point under the mouse instead",
+        description="Remove the point or the via point under the mouse instead; elsewhere on the "
+        "surface, invert snapping",
         default=False,
         options={"SKIP_SAVE"},
     )
@@ -82,7 +83,7 @@ class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
         return "Preparing the mesh"
 
     def _act(self, context: bpy.types.Context) -> set[str]:
-        hit = picking.under_mouse(context, self._pixel)
+        hit = picking.under_mouse(context, self._pixel, inverted=self.remove)
         if hit is None:
             return PASS
         if not (self.remove or self.via):
@@ -118,9 +119,10 @@ def _call_of(
     calls = bpy.ops.nicmm
     if remove:
         removals = {Kind.POINT: calls.remove_point, Kind.VIA: calls.remove_via_point}
-        if hit.kind not in removals:
+        if hit.kind in removals:
+            return removals[hit.kind], {"curve": hit.name, "index": hit.index}
+        if hit.kind not in {Kind.SURFACE, Kind.JUNCTION}:
             return None
-        return removals[hit.kind], {"curve": hit.name, "index": hit.index}
     named = {"curve": hit.name, "position": hit.position, "from_mouse": True}
     if hit.kind is Kind.VIA:
         return calls.move_via_point, {**named, "index": hit.index}

@@ -23,7 +23,7 @@ from ..scene.lookup import by_uid
 from ..scene.messages import InputError
 from ..scene.surface import Surface
 from ..scene.viewports import redraw
-from . import modes, picking
+from . import element_snap, modes, picking
 from .picking import Kind
 from .view import OFFSET, View
 
@@ -299,7 +299,8 @@ def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_M
     for number, position in enumerate(opened.via_positions()):
         marks.append(_Mark(position, _RINGS, fill(Kind.VIA, number)))
     if hit is not None and hit.kind in _SHAPES_OF_NEW_POINTS:
-        marks.append(_Mark(hit.position, _SHAPES_OF_NEW_POINTS[hit.kind], colours.hover))
+        shapes = _SHAPES_OF_ELEMENTS.get(hit.element, _SHAPES_OF_NEW_POINTS[hit.kind])
+        marks.append(_Mark(hit.position, shapes, colours.hover))
     return marks
 
 
@@ -335,6 +336,14 @@ def _square(inner: float, outer: float) -> np.ndarray:
     return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
 
 
+def _triangle(inner: float, outer: float) -> np.ndarray:
+    """Triangles between two upright triangles around the origin, as corners, (18, 2)."""
+    angles = np.pi * (0.5 + np.arange(4) * 2.0 / 3.0)
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    (a, b), (c, d) = ((size * rim[:-1], size * rim[1:]) for size in (inner, outer))
+    return np.stack([a, c, d, a, d, b], axis=1).reshape(-1, 2)
+
+
 def _outlined(
     shape: Callable[[float, float], np.ndarray], inner: float, outer: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -363,6 +372,18 @@ _SHAPES = {
     (True, True): _STARS,
 }
 """Shapes of control points, by whether they are corners and whether they lie on other curves."""
+
+_SHAPES_OF_ELEMENTS = {
+    element_snap.VERTEX: _outlined(_square, HOLE_RADIUS, RING_RADIUS),
+    element_snap.MIDPOINT: _outlined(_triangle, HOLE_RADIUS, RING_RADIUS + 2.0),
+    element_snap.EDGE: _outlined(_ring, HOLE_RADIUS, RING_RADIUS),
+    element_snap.CENTRE: (
+        np.concatenate([_outlined(_ring, HOLE_RADIUS, RING_RADIUS)[0], _ring(0.0, 3.0)]),
+        np.concatenate([_ring(HOLE_RADIUS, RING_RADIUS), _ring(0.0, 2.0)]),
+    ),
+    picking.CURVE: _DIAMONDS,
+}
+"""Shapes of the mark where a click would add a point, by the element that it snaps to."""
 
 _SHAPES_OF_NEW_POINTS = {
     Kind.LINE: _SMALL_DISCS,

@@ -21,7 +21,7 @@ from ..scene import curve_record, mirror_images, surface_cache
 from ..scene.lookup import by_uid, is_in
 from ..scene.messages import InputError
 from ..scene.surface import Surface
-from . import mirror_snap
+from . import element_snap, mirror_snap
 from .view import View, view_of
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
+
+CURVE = "CURVE"
+"""Name of another designed curve among the elements that points snap to."""
 
 SOLID = {"SOLID", "TEXTURED", "WIRE"}
 """Display types in which an object can hide the surface, unlike one shown by its bounds only."""
@@ -65,6 +68,8 @@ class Hit:
         The session_uid of the mesh object.
     is_image : bool
         Whether the place is on the mirror image of the point or curve.
+    element : str
+        The element that the place has snapped to; empty for none.
     """
 
     kind: Kind
@@ -73,6 +78,7 @@ class Hit:
     position: tuple[float, float, float]
     mesh_uid: int
     is_image: bool = False
+    element: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,14 +183,19 @@ def is_xray(space: bpy.types.SpaceView3D) -> bool:
     return shading.type == "SOLID" and shading.show_xray
 
 
-def under_mouse(context: bpy.types.Context, pixel: np.ndarray) -> Hit | None:
-    """What a click at a pixel meets; None if nothing, or if another mesh is in front."""
+def under_mouse(
+    context: bpy.types.Context, pixel: np.ndarray, inverted: bool = False
+) -> Hit | None:
+    """What a click at a pixel meets; None if nothing, or if another mesh is in front.
+
+    `inverted` tells whether Ctrl inverts snapping.
+    """
     mesh_object, curve = mesh_and_curve(context)
     if mesh_object is None:
         return None
     opened, name = opened_now(context), "" if curve is None else curve.name
     view = view_on(context, mesh_object, opened.surface)
-    hit = _hit(context, view, pixel, opened, name, curve)
+    hit = _hit(context, view, pixel, opened, name, curve, inverted)
     if hit is None or _is_behind_another(context, mesh_object, view, pixel, hit.position):
         return None
     return hit
@@ -212,6 +223,7 @@ def _hit(
     opened: Opened,
     name: str,
     curve: bpy.types.Object | None,
+    inverted: bool,
 ) -> Hit | None:
     scale = context.preferences.system.ui_scale
     positions = opened.positions()
@@ -239,15 +251,23 @@ def _hit(
     for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
-            position = tuple(line.positions[on_line[0]])
-            return Hit(Kind.CURVE, line.name, 0, position, opened.mesh_uid)
+            segment, share = on_line
+            start, end = line.positions[segment : segment + 2]
+            if element_snap.is_on(context, inverted):
+                position = tuple((1.0 - share) * start + share * end)
+                return Hit(
+                    Kind.SURFACE, name, len(positions), position, opened.mesh_uid, element=CURVE
+                )
+            return Hit(Kind.CURVE, line.name, 0, tuple(start), opened.mesh_uid)
     place = view.surface_point_at(pixel)
     if place is None:
         return None
     if mirror_snap.may_end_on_plane(opened):
         place = mirror_snap.snapped(view, opened, place, scale)
+    snap = element_snap.snapped(context, view, pixel, place, inverted)
+    place = snap.place
     position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
-    return Hit(Kind.SURFACE, name, len(positions), position, opened.mesh_uid)
+    return Hit(Kind.SURFACE, name, len(positions), position, opened.mesh_uid, element=snap.element)
 
 
 def junction_at(

@@ -22,7 +22,7 @@ from ..outputs import edited_curve, writing
 from ..outputs.edited_curve import Opened
 from ..scene.design_request import DesignRequest
 from ..scene.viewports import NAVIGATION, redraw
-from . import mirror_snap, overlay, picking
+from . import element_snap, mirror_snap, overlay, picking
 from .changes_points import ChangesPoints
 from .live_curve import LiveCurve
 
@@ -144,6 +144,10 @@ class PointDrag(ChangesPoints):
             place = picking.junction_at(context, self._view, pixel + self._grip, self._opened)
         if place is None:
             place = self._view.surface_point_at(pixel + self._grip)
+            inverted = bool(event.ctrl)
+            at = pixel + self._grip
+            if place is not None:
+                place = element_snap.snapped(context, self._view, at, place, inverted).place
         if place is None:
             return
         if self.may_be_on_plane(self._opened):

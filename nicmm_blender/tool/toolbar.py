@@ -50,7 +50,7 @@ Button Mouse*.
 HINTS = (
     (("MOUSE_LMB",), "Add or Insert Point"),
     (("MOUSE_LMB_DRAG",), "Move Point"),
-    (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
+    (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point or Invert Snap"),
     (("EVENT_J",), "Toggle Corner"),
     (("EVENT_SHIFT", "MOUSE_LMB_DRAG"), "Via Point on Curve"),
     (("EVENT_RETURN",), "End Curve"),
