@@ -22,6 +22,7 @@ from .operators import (
     move_curve,
     next_course,
     sliced_operator,
+    strokes_to_curves,
     time_slices,
     update_curves,
 )
@@ -49,6 +50,7 @@ MODULES = (
     time_slices,
     design_curve,
     convert_curve,
+    strokes_to_curves,
     update_curves,
     move_curve,
     course_search,

@@ -111,3 +111,63 @@ def test_the_tool_has_an_action(extension, ball):
     assert draw._call_of_action("POINTS", hit) is None
     assert draw._call_of_action("FREEHAND", hit) is not None
     assert draw._call_of_action("FEATURE", hit)[1] == {"position": (1.0, 0.0, 0.0)}
+
+
+@pytest.fixture
+def circle(ball):
+    """A Bézier circle around the ball, selected with the ball, which is active."""
+    bpy.ops.curve.primitive_bezier_circle_add(radius=1.0)
+    made = bpy.context.active_object
+    made.data.bevel_depth = 0.1
+    ball.select_set(True)
+    bpy.context.view_layer.objects.active = ball
+    return made
+
+
+def test_a_curve_object_becomes_a_designed_curve(circle):
+    assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05) == {"FINISHED"}
+    made = bpy.context.active_object
+    assert made is not circle and made.data.splines[0].use_cyclic_u
+    line = scenes.points(made)
+    np.testing.assert_allclose(line[:, 2], 0.0, atol=0.05)
+    assert circle.name in bpy.data.objects
+    assert len(bpy.data.curves) == 2  # no copies are left
+
+
+def test_originals_can_be_removed(circle):
+    name = circle.name
+    assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05, keep_original=False) == {"FINISHED"}
+    assert name not in bpy.data.objects
+
+
+def test_curves_far_from_the_mesh_are_reported(circle):
+    circle.location.x = 9.0
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="off the surface"):
+        bpy.ops.nicmm.strokes_to_curves(tolerance=0.05)
+    assert len(scenes.curves()) == 1
+
+
+def test_a_grease_pencil_stroke_becomes_a_designed_curve(ball):
+    pencil = bpy.data.grease_pencils_v3.new("Pencil")
+    drawn = bpy.data.objects.new("Pencil", pencil)
+    bpy.context.scene.collection.objects.link(drawn)
+    drawing = pencil.layers.new("Lines").frames.new(bpy.context.scene.frame_current).drawing
+    angles = np.linspace(0.0, 2.5, 60)
+    drawing.add_strokes([len(angles)])
+    for point, place in zip(
+        drawing.strokes[0].points, on_ball(angles, 0.2 * np.sin(angles)), strict=True
+    ):
+        point.position = place
+    scenes.activate(ball)
+    drawn.select_set(True)
+    assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05) == {"FINISHED"}
+    made = bpy.context.active_object
+    assert made.type == "CURVE" and not made.data.splines[0].use_cyclic_u
+    stroke = on_ball(angles, 0.2 * np.sin(angles))
+    assert scenes.distances_to(stroke, scenes.points(made)).max() < 0.08
+
+
+def test_nothing_selected_disables_the_button(ball):
+    scenes.activate(ball)
+    assert not bpy.ops.nicmm.strokes_to_curves.poll()

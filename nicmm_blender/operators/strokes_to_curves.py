@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that turns Grease Pencil strokes and curves near a mesh into designed curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty
+
+from ..outputs import curve_object, edited_curve
+from ..scene import curve_record, mesh_data, surface_cache
+from ..scene.control_points import ControlPoints
+from ..scene.messages import InputError, counted
+from ..scene.via_points import no_via_points
+from . import polls
+from .answers import answer_now
+from .error_reports import user_message, with_error_reports
+
+if TYPE_CHECKING:
+    from ..outputs.edited_curve import Opened
+
+SOURCES = {"CURVE", "CURVES", "GREASEPENCIL", "GPENCIL"}
+"""Types of objects that have strokes."""
+
+NO_STROKES = "Select Grease Pencil or curve objects, and make the mesh active"
+
+FEWEST = 2
+"""Least number of points of a stroke."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Points of a stroke in world space, (n, 3), and the name of its object."""
+
+    name: str
+    points: np.ndarray
+    closed: bool
+
+
+class NICMM_OT_strokes_to_curves(bpy.types.Operator):
+    """Create designed curves on the active mesh from the selected strokes and curves near it"""
+
+    bl_idname = "nicmm.strokes_to_curves"
+    bl_label = "Strokes to Designed Curves"
+    bl_options = {"REGISTER", "UNDO"}
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Greatest distance between a stroke and its curve, and of the stroke from the "
+        "mesh",
+        default=0.05,
+        min=0.0,
+        soft_max=1.0,
+        subtype="DISTANCE",
+    )
+    keep_original: BoolProperty(
+        name="Keep Original",
+        description="Keep the objects with the strokes",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        mesh_object = mesh_data.mesh_object(context)
+        can_run = mesh_object is not None and bool(_sources(context))
+        return polls.usable(cls, context, can_run, NO_STROKES, polls.OBJECT)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return with_error_reports(self, lambda: self._execute(context))
+
+    def _execute(self, context: bpy.types.Context) -> set[str]:
+        mesh_object = mesh_data.mesh_object(context)
+        sources = _sources(context)
+        strokes = [stroke for source in sources for stroke in strokes_of(context, source)]
+        if mesh_object is None or not strokes:
+            raise InputError("The selected objects have no strokes with at least two points")
+        made, remarks = [], []
+        for stroke in strokes:
+            try:
+                made.append(self._design(context, mesh_object, stroke))
+            except Exception as error:
+                text = _text_of(error)
+                if text is None:
+                    raise
+                remarks.append(f'"{stroke.name}": {text}')
+        if not made:
+            raise InputError("; ".join(remarks))
+        if not self.keep_original and not remarks:
+            for source in sources:
+                curve_object.remove(source)
+        curve_object.select_only(context, made[-1])
+        done = f"{len(made)} of {counted(len(strokes), 'stroke')} converted"
+        self.report({"WARNING"} if remarks else {"INFO"}, "; ".join([done, *remarks]))
+        return {"FINISHED"}
+
+    def _design(
+        self, context: bpy.types.Context, mesh_object: bpy.types.Object, stroke: Stroke
+    ) -> bpy.types.Object:
+        curve_object.select_only(context, mesh_object)
+        opened = _through(edited_curve.open_new(context), stroke, self.tolerance)
+        requests = edited_curve.request(opened, opened.points)
+        curves = edited_curve.curves_of(answer_now(context, requests))
+        panel = context.scene.nicmm_curves
+        made = edited_curve.write(context, opened, opened.points, curves, panel)
+        made.name = f"{stroke.name} Curve"
+        return made
+
+
+def _text_of(error: Exception) -> str | None:
+    """The message of an error about a stroke; None for any other error."""
+    from ... import nicmm_core as nicmm
+
+    if isinstance(error, InputError):
+        return str(error)
+    return user_message(error) if isinstance(error, nicmm.NicmmError) else None
+
+
+def _sources(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected objects with strokes, without designed curves."""
+    return [
+        each
+        for each in context.selected_objects
+        if each.type in SOURCES and not curve_record.has_record(each)
+    ]
+
+
+def _through(opened: Opened, stroke: Stroke, tolerance: float) -> Opened:
+    """A new curve that follows a stroke."""
+    surface = opened.surface
+    back = np.linalg.inv(surface.local_to_world)
+    local = stroke.points @ back[:3, :3].T + back[:3, 3]
+    with surface_cache.designer_of(surface) as designer:
+        found = designer.fit_stroke(
+            local @ surface.local_to_core.T, tolerance / surface.unit, stroke.closed
+        )
+    points = ControlPoints(found, np.zeros(len(found), dtype=bool))
+    settings = opened.settings.with_value("closed", stroke.closed)
+    return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)
+
+
+def strokes_of(context: bpy.types.Context, source: bpy.types.Object) -> Iterator[Stroke]:
+    """The strokes of an object as it is shown."""
+    found = _pencil_strokes(source) if "PENCIL" in source.type else _curve_lines(context, source)
+    world = np.array(source.matrix_world)
+    for points, closed in found:
+        if len(points) >= FEWEST:
+            yield Stroke(source.name, points @ world[:3, :3].T + world[:3, 3], closed)
+
+
+def _pencil_strokes(source: bpy.types.Object) -> Iterator[tuple[np.ndarray, bool]]:
+    """Points of the strokes of a Grease Pencil object at the current frame, in its local space."""
+    for layer in source.data.layers:
+        if layer.hide:
+            continue
+        if source.type == "GPENCIL":  # before Blender 4.3
+            strokes = layer.active_frame.strokes if layer.active_frame else ()
+            for stroke in strokes:
+                yield np.array([point.co[:] for point in stroke.points]), stroke.use_cyclic
+            continue
+        frame = layer.current_frame()
+        for stroke in frame.drawing.strokes if frame is not None else ():
+            yield np.array([point.position[:] for point in stroke.points]), stroke.cyclic
+
+
+def _curve_lines(
+    context: bpy.types.Context, source: bpy.types.Object
+) -> Iterator[tuple[np.ndarray, bool]]:
+    """Points of the splines of a curve object, without its bevel, in its local space."""
+    if source.type == "CURVES":
+        positions = np.empty((len(source.data.points), 3), dtype=np.float32)
+        source.data.points.foreach_get("position", positions.ravel())
+        for curve in source.data.curves:
+            begin = curve.first_point_index
+            yield positions[begin : begin + curve.points_length].astype(np.float64), False
+        return
+    plain = source.data.copy()
+    try:
+        plain.bevel_depth = plain.extrude = plain.offset = 0.0
+        plain.bevel_object = plain.taper_object = None
+        holder = bpy.data.objects.new(source.name, plain)
+        mesh = holder.to_mesh()
+        yield from _lines_of_mesh(mesh)
+        holder.to_mesh_clear()
+        bpy.data.objects.remove(holder)
+    finally:
+        bpy.data.curves.remove(plain)
+
+
+def _lines_of_mesh(mesh: bpy.types.Mesh) -> Iterator[tuple[np.ndarray, bool]]:
+    """The polylines that the edges of a mesh form, with consecutive vertices."""
+    places = np.array([vertex.co[:] for vertex in mesh.vertices]).reshape(-1, 3)
+    pairs = {tuple(sorted(edge.vertices)) for edge in mesh.edges}
+    begin = 0
+    for end in range(1, len(places) + 1):
+        if end < len(places) and (end - 1, end) in pairs:
+            continue
+        yield places[begin:end], (begin, end - 1) in pairs and end - begin > FEWEST
+        begin = end
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_OT_strokes_to_curves)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_strokes_to_curves)
