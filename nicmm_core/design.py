@@ -828,7 +828,7 @@ def feature_loop(
     weights : (V,) float array_like, optional
         Weights at the vertices; the rim of the region with more than half is followed next.
     reach : float, optional
-        Distance from the point within which the feature is looked for, by default four edges.
+        Distance from the point within which the feature is looked for; at least four edges.
 
     Returns
     -------

@@ -31,7 +31,10 @@ from .progress import checkpoint
 from .repair.clean_surface import joined_surface
 
 REACH = 4.0
-"""Distance from the point within which a feature is looked for, in mean edge lengths there."""
+"""Least distance from the point within which a feature is looked for, in mean edge lengths
+there."""
+
+WANTED = "a length of at least 0"
 
 OFF = 50.0
 """Cost of an edge off the feature, relative to one on it. So a gap in the feature is bridged if the
@@ -43,12 +46,15 @@ ON = 0.4
 SHARE = 0.8
 """Least part of a loop, by its length, that is on the feature."""
 
-GATE = 5.0
-"""Radius of the ball around a point of a smooth ridge in which a loop cannot turn back, in mean
-edge lengths. Ridges are several edges wide."""
+GATES = (2.5, 5.0, 10.0, 20.0, 40.0)
+"""Radii of the ball around a point of a smooth ridge in which a loop cannot turn back, in mean edge
+lengths. Ridges may be many edges wide."""
+
+LOOP = 4.0 * np.pi
+"""Least length of a loop in radii of the ball; a shorter one runs around the ball on the ridge."""
 
 SHORT = 0.5
-"""Length below which a loop is ignored, relative to that of another feature."""
+"""Length below which a loop or line is ignored, relative to that of another feature."""
 
 STRIKING = 1.5
 """Least curvature of a ridge or valley, relative to the mean curvature around it."""
@@ -150,9 +156,10 @@ def feature_line(
     surface = joined_surface(mesh)
     graph = _EdgeGraph(surface.mesh)
     size = graph.size_near(place)
-    within = REACH * size if reach is None else checked_number("reach", reach, "a positive length")
-    if within <= 0.0:
-        raise ArgumentError(f"reach is {reach!r}; pass a positive length")
+    wanted = 0.0 if reach is None else checked_number("reach", reach, WANTED)
+    if wanted < 0.0:
+        raise ArgumentError(f"reach is {reach!r}; pass {WANTED}")
+    within = max(wanted, REACH * size)
     painted = checked_map("weights", weights, mesh)
     if painted is not None:
         on_surface = np.zeros(len(surface.mesh.vertices))
@@ -220,15 +227,20 @@ class _EdgeGraph:
         self, feature: _Feature, place: FloatArray, size: float, across_gaps: bool
     ) -> IntArray | None:
         """The vertices of the loop along a feature through a place; None if there is none."""
-        crossing = self._crossing(feature, place, size)
-        on = feature.strength >= ON
-        used = ~crossing if across_gaps else on & ~crossing
-        path = self._path(used, self._costs(feature), feature.start, feature.target)
-        return path if path is not None and self._share_on(path, on) >= SHARE else None
+        on, costs = feature.strength >= ON, self._costs(feature)
+        for gate in GATES:
+            crossing = self._crossing(feature, place, gate * size)
+            used = ~crossing if across_gaps else on & ~crossing
+            path = self._path(used, costs, feature.start, feature.target)
+            if path is None or self._share_on(path, on) < SHARE:
+                return None
+            if feature.is_line or self.length(path) >= LOOP * gate * size:
+                return path
+        return None
 
     def open_line(self, feature: _Feature, place: FloatArray, size: float) -> IntArray:
         """The vertices of the line along a feature in both directions from a place."""
-        used = (feature.strength >= ON) & ~self._crossing(feature, place, size)
+        used = (feature.strength >= ON) & ~self._crossing(feature, place, GATES[1] * size)
         costs = self._costs(feature)
         one, other = (self._farthest(used, costs, v) for v in (feature.start, feature.target))
         return np.concatenate([other[::-1], one])
@@ -245,8 +257,8 @@ class _EdgeGraph:
         costs: FloatArray = self.lengths * (1.0 / OFF + off)
         return costs
 
-    def _crossing(self, feature: _Feature, place: FloatArray, size: float) -> BoolArray:
-        """The edges that lead from one side of a place on the feature to the other."""
+    def _crossing(self, feature: _Feature, place: FloatArray, radius: float) -> BoolArray:
+        """The edges in a ball that lead from one side of a place on the feature to the other."""
         start, target = feature.start, feature.target
         if feature.is_line:
             result: BoolArray = np.isin(self.edges, [start, target]).all(axis=1)
@@ -254,7 +266,7 @@ class _EdgeGraph:
         along = self.mesh.vertices[start] - self.mesh.vertices[target]
         middle = 0.5 * (self.mesh.vertices[start] + self.mesh.vertices[target])
         side = (self.mesh.vertices - middle) @ along
-        near = np.linalg.norm(self.mesh.vertices - middle, axis=1) <= GATE * size
+        near = np.linalg.norm(self.mesh.vertices - middle, axis=1) <= radius
         ends = self.edges
         crosses: BoolArray = (side[ends[:, 0]] < 0.0) != (side[ends[:, 1]] < 0.0)
         return crosses & near[ends].any(axis=1)
@@ -296,7 +308,7 @@ class _EdgeGraph:
 def _best_line(
     graph: _EdgeGraph, features: list[_Feature], place: FloatArray, size: float
 ) -> tuple[_Feature, IntArray, bool]:
-    """The loop along the first feature that has one, otherwise the longest open line.
+    """The loop along the first feature that has one, otherwise an open line.
 
     A smooth ridge comes before gaps in lines, and before much shorter loops, since on a rough ridge
     some edges are sharp.
@@ -311,8 +323,9 @@ def _best_line(
             if loop is not None and length >= SHORT * lengths.max():
                 return feature, loop, True
     lines = [graph.open_line(feature, place, size) for feature in features]
-    longest = int(np.argmax([graph.length(line) for line in lines]))
-    return features[longest], lines[longest], False
+    lengths = np.array([graph.length(line) for line in lines])
+    chosen = int((lengths >= SHORT * lengths.max()).argmax())
+    return features[chosen], lines[chosen], False
 
 
 def _next_to(
@@ -384,7 +397,9 @@ def _ridge_near(graph: _EdgeGraph, place: FloatArray, reach: float, size: float)
     crest = np.where(is_curved, curvature, 0.0) / np.where(is_curved, around_each, 1.0)
     crest = crest.clip(0.0, 1.0)
     # Along the ridge, there are many curved vertices near the top.
-    ball = np.array(graph.tree.query_ball_point(mesh.vertices[top], GATE * size), dtype=np.int64)
+    ball = np.array(
+        graph.tree.query_ball_point(mesh.vertices[top], GATES[1] * size), dtype=np.int64
+    )
     offset = mesh.vertices[ball] - mesh.vertices[top]
     heavy = (curvature[ball] / greatest).clip(0.0, 1.0) ** 2
     _, axes = np.linalg.eigh(np.einsum("n,ni,nj->ij", heavy, offset, offset))

@@ -56,8 +56,12 @@ DENSE = 0.1
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_ROUNDS, MOST_ROUNDS_FROM_START, MOST_CHECKS = 8, 12, 2
+MOST_ROUNDS, MOST_ROUNDS_FROM_START, MOST_CHECKS = 8, 4, 2
 """Greatest number of curves that are designed in each of the three steps."""
+
+MOST_POINTS = 48
+"""Greatest number of control points that are tried, unless the first guess has more than half of
+them. More would take long, and the stroke is then most likely one that no curve can follow."""
 
 APART = 3
 """Least number of places between two control points."""
@@ -143,7 +147,7 @@ def fitted_points(
     on_surface = nearest_points(mesh, places)[0]
     normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
     begin = _fewest_knots(places, normals, tolerance, closed)
-    found = fit.refined(begin, len(places), MOST_ROUNDS)
+    found = fit.refined(begin, max(MOST_POINTS, 2 * len(begin)), MOST_ROUNDS)
     if found is None:
         raise UnreachableError(
             f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
@@ -184,8 +188,7 @@ class _Fit:
         rounds : int
             Greatest number of curves that are designed.
         start : SurfaceCurve, optional
-            A curve from which each curve is relaxed. Only one knot is then added at a time, since
-            that is fast; otherwise one between any two where it is needed.
+            A curve from which each curve is relaxed.
 
         Returns
         -------
@@ -208,7 +211,7 @@ class _Fit:
                 if not len(missing):
                     return knots, curve
             finer = knots
-            for place in missing if start is None else missing[:1]:
+            for place in missing:
                 finer = _with_knot(finer, len(self.places), self.closed, int(place))
             if not len(missing):
                 finer = _with_knot(knots, len(self.places), self.closed, None)

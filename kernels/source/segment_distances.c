@@ -744,7 +744,8 @@ static int add_into_face(const Mesh *mesh, Propagation *work, const Fan *fan,
 {
     double end = begin + view->angle;
     double offset = sign > 0.0 ? 0.0 : directions->of_first;
-    double cuts[2] = {sign * (directions->leaving - offset), sign * (directions->arriving - offset)};
+    double cuts[2] = {sign * (directions->leaving - offset),
+                      sign * (directions->arriving - offset)};
     double from = greater(low, begin), last = lesser(high, end);
     while (from < last) {
         double to = last;

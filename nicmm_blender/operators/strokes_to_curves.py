@@ -14,11 +14,11 @@ from bpy.props import BoolProperty, FloatProperty
 from ..outputs import curve_object, edited_curve
 from ..scene import curve_record, mesh_data, surface_cache
 from ..scene.control_points import ControlPoints
-from ..scene.messages import InputError, counted
+from ..scene.messages import InputError, counted, user_message
 from ..scene.via_points import no_via_points
 from . import polls
 from .answers import answer_now
-from .error_reports import user_message, with_error_reports
+from .error_reports import with_error_reports
 
 if TYPE_CHECKING:
     from ..outputs.edited_curve import Opened

@@ -29,6 +29,9 @@ from .point_operators import POSITION
 if TYPE_CHECKING:
     from ...nicmm_core import SurfacePoints
 
+NEAR = 30.0
+"""Distance from the mouse within which a feature is looked for, in pixels at a scale of 1."""
+
 CLOSING = 16.0
 """Distance in pixels, at a scale of 1, between the ends of a stroke that is closed."""
 
@@ -113,6 +116,8 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
+    from_mouse = True  # so a position near the surface is good enough
+
     position: POSITION
     use_map: bpy.props.BoolProperty(
         name="Rim of Map",
@@ -122,14 +127,24 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
     )
     reach: bpy.props.FloatProperty(
         name="Reach",
-        description="Distance from the point within which the feature is looked for. If zero, it "
-        "is a few edges of the mesh",
+        description="Distance from the point within which the feature is looked for, at least a "
+        "few edges of the mesh",
         default=0.0,
         min=0.0,
         soft_max=1.0,
         subtype="DISTANCE",
         options={"SKIP_SAVE"},
     )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Look for the feature near the mouse, if the caller has not given a distance."""
+        if not self.properties.is_property_set("reach") and picking.is_view(context):
+            opened = edited_curve.open_new(context)
+            view = picking.view_on(context, opened.mesh_object, opened.surface)
+            pixels = NEAR * context.preferences.system.ui_scale
+            place = np.array(self.properties["position"][:], dtype=np.float64)
+            self.reach = pixels * view.pixel_size(place) * opened.surface.scale
+        return super().invoke(context, event)
 
     def open_curve(self, context: bpy.types.Context) -> Opened:
         self._map = context.scene.nicmm_curves.alignment_group if self.use_map else ""
@@ -140,8 +155,7 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
     def edited(self, opened: Opened) -> Opened:
         check_finite("reach", self.reach)
         surface = opened.surface
-        given = np.array([self.position[:]], dtype=float)
-        place = edited_curve.nearest_surface_points(opened, given)
+        place = self._place(opened)
         reach = self.reach / surface.unit if self.reach else None
         weights = None
         if self._map:

@@ -33,8 +33,12 @@ OPERATORS = (
     "activate_curve",
     "end_curve",
     "draw_on_surface",
+    "draw_stroke",
+    "stroke_curve",
+    "feature_curve",
+    "strokes_to_curves",
 )
-PANELS = ("NICMM_PT_design_curve", "NICMM_PT_maps", "NICMM_PT_curves")
+PANELS = ("NICMM_PT_design_curve", "NICMM_PT_measures", "NICMM_PT_maps", "NICMM_PT_curves")
 
 
 @pytest.fixture

@@ -91,6 +91,10 @@ POSE = {
 """Angles of bones, each named for the joint at its end."""
 
 
+TOOTH_PIECES = 224
+"""Number of quads along a side of the tooth."""
+
+
 def dress_form():
     """Half of a dress form with the modifiers Mirror and Subdivision Surface."""
     count = 14
@@ -177,6 +181,50 @@ def pose(angles):
     for name, turned in angles.items():
         bones[name].rotation_mode = "XYZ"
         bones[name].rotation_euler = turned
+
+
+def tooth():
+    """A prepared tooth with a wavy ridge, the margin; returns the number of its triangles."""
+    line = np.linspace(-1.0, 1.0, TOOTH_PIECES + 1)
+    x, y = np.meshgrid(line, line)
+    angle, size = np.arctan2(y, x), np.hypot(x, y)
+    radius, height = _margin(angle)
+    outside = size - radius
+    roof = -0.9 * (np.hypot(outside, 0.03) - 0.03)
+    stump = 0.5 / (1.0 + np.exp((outside + 0.33) / 0.05))
+    z = height + roof + stump
+    index = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    quads = np.stack([a, b, c, d], axis=-1).reshape(-1, 4)
+    _body("Tooth", np.stack([x, y, z], axis=-1).reshape(-1, 3).tolist(), quads.tolist())
+    return 2 * len(quads)
+
+
+def _margin(angle):
+    """Radius and height of the margin of the tooth at angles."""
+    radius = 0.6 + 0.05 * np.cos(2.0 * angle) + 0.03 * np.sin(3.0 * angle)
+    return radius, 0.05 * np.sin(2.0 * angle) + 0.03 * np.cos(4.0 * angle)
+
+
+def off_margin(points):
+    """Greatest distance of points from the margin of the tooth."""
+    angle = np.linspace(-np.pi, np.pi, 4000)
+    radius, height = _margin(angle)
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    away = [np.linalg.norm(rim - point, axis=1).min() for point in np.array(points)]
+    return float(max(away))
+
+
+def edge_length():
+    """Length of the edges of the tooth, seen from above."""
+    return 2.0 / TOOTH_PIECES
+
+
+def box():
+    """A cube of six quads."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    _body("Box", corners, faces).data.shade_flat()
 
 
 def _body(name, places, faces):

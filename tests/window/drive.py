@@ -21,6 +21,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from designers import designers  # noqa: E402
+from scans import scans  # noqa: E402
 from screen import (  # noqa: E402
     HOLD,
     Blender,
@@ -952,6 +953,7 @@ PARTS = {
     "several": several,
     "symmetry": symmetry,
     "designers": designers,
+    "scans": scans,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

@@ -99,6 +99,30 @@ class Helper:
         return [list(location) for _hit, location, _normal, _face in found]
 
     @staticmethod
+    def above(pairs, name):
+        """Points of an object that are visible from above, at x and y."""
+        shown = bpy.data.objects[name]
+        found = [shown.ray_cast((x, y, 5.0), (0.0, 0.0, -1.0)) for x, y in pairs]
+        return [list(location) for _hit, location, _normal, _face in found]
+
+    @staticmethod
+    def activate_object(name):
+        """Make an object active and the only selected one."""
+        bpy.ops.object.select_all(action="DESELECT")
+        chosen = bpy.data.objects[name]
+        chosen.select_set(True)
+        bpy.context.view_layer.objects.active = chosen
+
+    @classmethod
+    def nearest_to_eye(cls):
+        """The index of the control point of the active curve that is nearest to the eye."""
+        from mathutils import Vector
+
+        view = cls.area().spaces.active.region_3d.view_matrix
+        depths = [(view @ Vector(place)).z for place in cls.places()]
+        return int(np.argmax(depths))
+
+    @staticmethod
     def from_above(pairs):
         """Points of Suzanne that are visible from above, at x and y."""
         monkey = bpy.data.objects["Suzanne"]

@@ -67,7 +67,8 @@ class Blender:
         ends = time.monotonic() + PATIENCE
         while not reply.exists():
             if self.process.poll() is not None or time.monotonic() > ends:
-                raise SystemExit(f"no answer to: {source}\n{self.log()}")
+                status = self.process.poll()
+                raise SystemExit(f"no answer to: {source} (exit status {status})\n{self.log()}")
             time.sleep(0.05)
         found = json.loads(reply.read_text())
         if "error" in found:
