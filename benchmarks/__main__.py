@@ -63,6 +63,7 @@ MEASUREMENTS = (
     "fuzz",
     "cuts",
     "offsets",
+    "strokes",
 )
 """Modules of this package, in the order of RESULTS.md; see `report` for what each one defines."""
 

@@ -331,15 +331,31 @@ class Designer:
             return offset_curves(mapped, there, widths)
 
     def fit_stroke(
-        self, points: ArrayLike, tolerance: float, closed: bool = False
+        self,
+        points: ArrayLike,
+        tolerance: float,
+        closed: bool = False,
+        *,
+        smoothness: float = 1.0,
+        normal_bending: float = 0.0,
     ) -> SurfacePoints:
-        """The control points that `fit_stroke` finds, as points of the surface."""
+        """The control points that `fit_stroke` finds, as points of the surface.
+
+        The curve that stays within the tolerance is the one with the same smoothness and normal
+        bending, since these change its shape between the points.
+        """
         if not isinstance(closed, bool | np.bool_):
             raise ArgumentError(f"closed is {closed!r}; pass True or False")
         stroke, within = checked_stroke(self.mesh, points, tolerance, bool(closed))
 
         def design(controls: SurfacePoints, start: SurfaceCurve | None) -> SurfaceCurve:
-            found = self.design(controls, closed=bool(closed), start=start)
+            found = self.design(
+                controls,
+                closed=bool(closed),
+                smoothness=smoothness,
+                normal_bending=normal_bending,
+                start=start,
+            )
             return only_curve(found, "design")
 
         return fitted_points(self.mesh, stroke, within, bool(closed), design)

@@ -12,7 +12,7 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ..outputs import curve_object, edited_curve
-from ..scene import curve_record, mesh_data, surface_cache
+from ..scene import curve_record, mesh_data
 from ..scene.control_points import ControlPoints
 from ..scene.messages import InputError, counted, user_message
 from ..scene.via_points import no_via_points
@@ -133,10 +133,8 @@ def _through(opened: Opened, stroke: Stroke, tolerance: float) -> Opened:
     surface = opened.surface
     back = np.linalg.inv(surface.local_to_world)
     local = stroke.points @ back[:3, :3].T + back[:3, 3]
-    with surface_cache.designer_of(surface) as designer:
-        found = designer.fit_stroke(
-            local @ surface.local_to_core.T, tolerance / surface.unit, stroke.closed
-        )
+    given = local @ surface.local_to_core.T
+    found = edited_curve.points_along(opened, given, tolerance, stroke.closed)
     points = ControlPoints(found, np.zeros(len(found), dtype=bool))
     settings = opened.settings.with_value("closed", stroke.closed)
     return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)

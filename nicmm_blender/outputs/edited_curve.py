@@ -443,6 +443,26 @@ def nearest_surface_points(edited: Opened, positions: np.ndarray) -> SurfacePoin
     return nearest_points(mesh, positions @ surface.local_to_core.T)[0]
 
 
+def points_along(
+    edited: Opened, stroke: np.ndarray, tolerance: float, closed: bool
+) -> SurfacePoints:
+    """Few points through which a curve with these settings follows a stroke.
+
+    Parameters
+    ----------
+    edited : Opened
+    stroke : (n, 3) float array
+        In the space of the core.
+    tolerance : float
+        Greatest distance between the stroke and the curve, in the scene.
+    closed : bool
+    """
+    shape = {name: getattr(edited.settings, name) for name in SAME_COURSE}
+    within = tolerance / edited.surface.unit
+    with surface_cache.designer_of(edited.surface) as designer:
+        return designer.fit_stroke(stroke, within, closed, **shape)
+
+
 def with_point(
     points: ControlPoints, number: int, place: SurfacePoints, replaced: bool = False
 ) -> ControlPoints:

@@ -93,10 +93,8 @@ class NICMM_OT_stroke_curve(ChangesPoints, bpy.types.Operator):
         if len(stroke) < FEWEST:
             raise InputError("The stroke has fewer than two points. Draw a longer one")
         stroke = stroke @ opened.surface.local_to_core.T
-        within = self.tolerance / opened.surface.unit
         closed = self.closed and not self.redraw
-        with surface_cache.designer_of(opened.surface) as designer:
-            found = designer.fit_stroke(stroke, within, closed)
+        found = edited_curve.points_along(opened, stroke, self.tolerance, closed)
         if self.redraw:
             return _with_stretch(opened, found, stroke)
         return _through(opened, found, closed)

@@ -48,6 +48,21 @@ def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
     assert farthest(found, stroke) <= 2.0 * noise * 1.001
 
 
+def test_a_curve_with_normal_bending_stays_near_the_stroke(body):
+    designer, points = nicmm.Designer(body), random_surface_points(body, 4, 1)
+    curve = designer.design(points, closed=False, order="shortest").curves[0]
+    tolerance = 0.02 * body.diagonal
+    stroke = stroke_of(curve, 0.5 * tolerance, 1)
+
+    def away(**shape):
+        fitted = designer.fit_stroke(stroke, tolerance, **shape)
+        design = designer.design(fitted, closed=False, normal_bending=0.3)
+        return farthest(design.curves[0], stroke)
+
+    assert away(normal_bending=0.3) <= tolerance * 1.001
+    assert away() > tolerance
+
+
 def test_a_stroke_without_noise_is_followed_closely(ball):
     curve = nicmm.design_curve(ball, [5, 200, 400], closed=False).curves[0]
     tolerance = 1e-3 * ball.diagonal
