@@ -232,9 +232,10 @@ class _EdgeGraph:
             crossing = self._crossing(feature, place, gate * size)
             used = ~crossing if across_gaps else on & ~crossing
             path = self._path(used, costs, feature.start, feature.target)
-            if path is None or self._share_on(path, on) < SHARE:
+            if path is None:
                 return None
-            if feature.is_line or self.length(path) >= LOOP * gate * size:
+            is_long = feature.is_line or self.length(path) >= LOOP * gate * size
+            if is_long and self._share_on(path, on) >= SHARE:
                 return path
         return None
 
@@ -242,7 +243,9 @@ class _EdgeGraph:
         """The vertices of the line along a feature in both directions from a place."""
         used = (feature.strength >= ON) & ~self._crossing(feature, place, GATES[1] * size)
         costs = self._costs(feature)
-        one, other = (self._farthest(used, costs, v) for v in (feature.start, feature.target))
+        one = self._farthest(used, costs, feature.start)
+        used &= ~np.isin(self.edges, one).any(axis=1)  # the line does not meet itself
+        other = self._farthest(used, costs, feature.target)
         return np.concatenate([other[::-1], one])
 
     def length(self, path: IntArray) -> float:
