@@ -36,6 +36,10 @@ SMOOTHING = 0.35
 """Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
 this size is removed."""
 
+CORNERS, SMOOTHINGS = 0.75, 4
+"""Greatest distance of the smoothed stroke from the stroke, as at corners, in tolerances; and how
+often it is smoothed less until that is so."""
+
 AT_ENDS = 10.0
 """Weight of the ends of an open stroke, relative to its other points, when it is smoothed."""
 
@@ -260,9 +264,12 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
     weights = np.ones(len(line))
     if not closed:
         weights[[0, -1]] = AT_ENDS
-    spline, _ = splprep(line.T, w=weights, s=squares, k=degree, per=closed)
     share = np.linspace(0.0, 1.0, 4 * MOST_PLACES)
-    fine = np.stack(splev(share, spline), axis=1)
+    for smoothing in np.append(squares * 0.25 ** np.arange(SMOOTHINGS), 0.0):
+        spline, _ = splprep(line.T, w=weights, s=smoothing, k=degree, per=closed)
+        fine = np.stack(splev(share, spline), axis=1)
+        if cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance:
+            break
     arcs = _arcs(fine)
     count = int(np.clip(2.0 * arcs[-1] / tolerance, PLACES, MOST_PLACES))
     wanted = np.linspace(0.0, arcs[-1], count, endpoint=not closed)

@@ -40,11 +40,14 @@ class Measured:
     combs : list of (n, 2, 3) float array
         For each curve, the ends of the teeth of its comb at a scale of 1, in the local space of the
         mesh: on the curve, and away from it.
+    closed : list of bool
+        Whether each curve is closed.
     problem : str
     """
 
     values: list[dict[str, Any]]
     combs: list[np.ndarray]
+    closed: list[bool]
     problem: str = ""
 
 
@@ -73,7 +76,7 @@ def now(curve: bpy.types.Object) -> Measured:
         try:
             measured = _measure(curve)
         except (InputError, nicmm.NicmmError) as error:
-            measured = Measured([], [], str(error))
+            measured = Measured([], [], [], str(error))
         found = _measured[curve.session_uid] = surface_cache.changes(), measured
     return found[1]
 
@@ -106,7 +109,7 @@ def _measure(curve: bpy.types.Object) -> Measured:
             found = designer.measures(each, weights, _up(surface), bends)
             values.append(_in_scene(found, surface.unit))
             combs.append(_comb(surface, curvature_samples(designer.mesh, each)))
-    return Measured(values, combs)
+    return Measured(values, combs, [each.closed for each in curves])
 
 
 def _up(surface: Surface) -> np.ndarray:

@@ -34,16 +34,19 @@ def _draw() -> None:
     measured, mesh_object = measures.of(curve), curve_record.mesh_of(curve)
     if measured is None or mesh_object is None:
         return
-    for comb in measured.combs:
+    for comb, closed in zip(measured.combs, measured.closed, strict=True):
         ends = comb.copy()
         ends[:, 1] = ends[:, 0] + settings.nicmm_comb_scale * (ends[:, 1] - ends[:, 0])
-        _draw_comb(context, mesh_object, ends)
+        _draw_comb(context, mesh_object, ends, closed)
 
 
-def _draw_comb(context: bpy.types.Context, mesh_object: bpy.types.Object, ends: np.ndarray) -> None:
+def _draw_comb(
+    context: bpy.types.Context, mesh_object: bpy.types.Object, ends: np.ndarray, closed: bool
+) -> None:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     teeth = batch_for_shader(shader, "LINES", {"pos": ends.reshape(-1, 3).astype(np.float32)})
-    rim = overlay.batch_of_line(ends[:, 1])
+    tips = np.concatenate([ends[:, 1], ends[:1, 1]]) if closed else ends[:, 1]
+    rim = overlay.batch_of_line(tips)
     matrix = context.region_data.view_matrix @ mesh_object.matrix_world
     colour = overlay.Colours(context).hover
     for batch in (teeth, rim):

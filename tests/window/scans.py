@@ -77,6 +77,7 @@ def parallel(blender: Blender) -> None:
     blender.shot("33-parallel")
     blender.do("bpy.data.objects['Margin Parallel'].nicmm_parallel.count = 1")
     check(blender.do(f"value = {count}") >= 2, "one on each side after the count has changed")
+    blender.do('bpy.ops.ed.undo_push(message="Count")')
 
     step("They follow the margin when a point is dragged")
     blender.do("helper.activate_object('Margin')")
