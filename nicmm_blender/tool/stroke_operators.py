@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 NEAR = 30.0
 """Distance from the mouse within which a feature is looked for, in pixels at a scale of 1."""
 
+STEP = 4.0
+"""Greatest distance in pixels between places of a stroke."""
+
 CLOSING = 16.0
 """Distance in pixels, at a scale of 1, between the ends of a stroke that is closed."""
 
@@ -244,13 +247,21 @@ class NICMM_OT_draw_stroke(bpy.types.Operator):
         self._end(context)
 
     def _add(self, pixel: np.ndarray) -> None:
-        """Add the place under the mouse to the stroke."""
-        place = self._view.surface_point_at(pixel)
-        if place is None:
-            return
+        """Add the place under the mouse to the stroke, and those on the way to it.
+
+        A fast mouse leaves gaps, in which the stroke would not follow the surface.
+        """
         surface = self._opened.surface
-        self._positions.append(surface.points(place.faces, place.barycentric)[0])
-        self._pixels.append(pixel)
+        before = self._pixels[-1] if self._pixels else pixel
+        number = max(int(np.ceil(np.linalg.norm(pixel - before) / STEP)), 1)
+        for share in np.arange(1, number + 1) / number:
+            between = before + share * (pixel - before)
+            place = self._view.surface_point_at(between)
+            if place is not None:
+                self._positions.append(surface.points(place.faces, place.barycentric)[0])
+                self._pixels.append(between)
+        if not self._positions:
+            return
         line = np.array(self._positions)
         to_world = surface.local_to_world
         self._shown.show(line @ to_world[:3, :3].T + to_world[:3, 3], closed=False)

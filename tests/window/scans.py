@@ -112,7 +112,7 @@ def strokes(blender: Blender) -> None:
     count = blender.do("value = helper.count()")
     print(f"   {count} control points")
     check(count < 15, "few control points")
-    blender.do("helper.curve().name = 'Stroke'")
+    blender.do("helper.curve().name = 'Stroke'\nbpy.ops.ed.undo_push(message='Rename')")
     blender.shot("36-freehand")
 
     step("Redraw a stretch of it")
