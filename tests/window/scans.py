@@ -162,7 +162,7 @@ def snapping(blender: Blender) -> None:
     tools = "bpy.context.tool_settings"
     blender.do(f"{tools}.use_snap = True")
     cases = (
-        ("VERTEX", (0.9, -1.0, 0.92), (1.0, -1.0, 1.0), "39-vertex"),
+        ("VERTEX", (0.95, -1.0, 0.96), (1.0, -1.0, 1.0), "39-vertex"),
         ("EDGE_MIDPOINT", (0.93, -1.0, 0.05), (1.0, -1.0, 0.0), "40-midpoint"),
         ("FACE", (0.06, -1.0, -0.04), (0.0, -1.0, 0.0), "41-centre"),
     )
