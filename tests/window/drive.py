@@ -21,7 +21,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from designers import designers  # noqa: E402
-from scans import scans  # noqa: E402
+from scans import crown, scans, snapping  # noqa: E402
 from screen import (  # noqa: E402
     HOLD,
     Blender,
@@ -954,6 +954,8 @@ PARTS = {
     "symmetry": symmetry,
     "designers": designers,
     "scans": scans,
+    "crown": crown,
+    "snapping": snapping,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

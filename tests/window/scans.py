@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work on a scan, a part of `drive.py`: margin, measures, parallel curves, strokes and snapping.
+"""Work on a scan, parts of `drive.py`: margin, measures, parallel curves, strokes, and snapping.
 
 The scan is a prepared tooth of 100,000 triangles, made by `bodies.py`.
 """
@@ -7,7 +7,7 @@ The scan is a prepared tooth of 100,000 triangles, made by `bodies.py`.
 import math
 import time
 
-from designers import begin, change, click_seen, release
+from designers import begin, change, release
 from screen import Blender, check, choose_tool, count_points, state, step
 
 MARGIN_ANGLE = -1.2
@@ -28,17 +28,13 @@ def scans(blender: Blender) -> None:
     margin(blender)
     parallel(blender)
     strokes(blender)
-    snapping(blender)
-    part(blender)
 
 
 def margin(blender: Blender) -> None:
     """One click beside the margin."""
     step("The margin of a tooth by one click")
     begin(blender, tool_action="FEATURE")
-    place = (0.63 * math.cos(MARGIN_ANGLE), 0.63 * math.sin(MARGIN_ANGLE))
-    (target,) = blender.do(f"value = helper.above({[place]}, 'Tooth')")
-    (pixel,) = blender.do(f"value = helper.pixels({target}, 'Tooth')")
+    pixel = beside_margin(blender)
     blender.move(pixel)
     blender.shot("30-before-the-click")
     begun = time.monotonic()
@@ -62,6 +58,14 @@ def margin(blender: Blender) -> None:
     blender.shot("32-measures")
     blender.do("bpy.context.window_manager.nicmm_show_comb = False")
     blender.do("helper.area().spaces.active.show_region_ui = False")
+
+
+def beside_margin(blender: Blender):
+    """The pixel of a place beside the margin."""
+    place = (0.63 * math.cos(MARGIN_ANGLE), 0.63 * math.sin(MARGIN_ANGLE))
+    (target,) = blender.do(f"value = helper.above({[place]}, 'Tooth')")
+    (pixel,) = blender.do(f"value = helper.pixels({target}, 'Tooth')")
+    return pixel
 
 
 def parallel(blender: Blender) -> None:
@@ -155,7 +159,8 @@ def draw_stroke(blender: Blender, pixels, name: str) -> None:
 
 
 def snapping(blender: Blender) -> None:
-    """Points that snap to a vertex, the middle of an edge and another curve."""
+    """Points that snap to a vertex, the middle of an edge and the centre of a face."""
+    blender.do("helper.area().spaces.active.show_region_ui = False")
     step("Points snap to elements of a cube")
     blender.do("bodies.box()\nhelper.look(0.5, -1.0, 0.6, 6.0)")
     begin(blender, tool_action="POINTS")
@@ -163,8 +168,8 @@ def snapping(blender: Blender) -> None:
     blender.do(f"{tools}.use_snap = True")
     cases = (
         ("VERTEX", (0.95, -1.0, 0.96), (1.0, -1.0, 1.0), "39-vertex"),
-        ("EDGE_MIDPOINT", (0.93, -1.0, 0.05), (1.0, -1.0, 0.0), "40-midpoint"),
-        ("FACE", (0.06, -1.0, -0.04), (0.0, -1.0, 0.0), "41-centre"),
+        ("EDGE_MIDPOINT", (0.97, -1.0, 0.03), (1.0, -1.0, 0.0), "40-midpoint"),
+        ("FACE", (0.04, -1.0, -0.03), (0.0, -1.0, 0.0), "41-centre"),
     )
     for number, (element, near, exact, name) in enumerate(cases):
         blender.do(f"{tools}.snap_elements = {{{element!r}}}")
@@ -176,19 +181,21 @@ def snapping(blender: Blender) -> None:
         blender.click(pixel)
         count_points(blender, number + 1)
         place = blender.do(f"value = helper.places()[{number}]")
+        print(f"   {place}")
         check(math.dist(place, exact) < 1e-6, f"the point is exactly at the {element.lower()}")
     blender.do(f"{tools}.use_snap = False")
 
 
-def part(blender: Blender) -> None:
+def crown(blender: Blender) -> None:
     """The crown of the tooth as a separate object."""
+    blender.do("helper.area().spaces.active.show_region_ui = False")
     step("The part inside of the margin")
     triangles = blender.do("value = bodies.tooth()")
     print(f"   {triangles} triangles")
     blender.do("helper.look(0.25, -1.0, 1.1, 2.6)")
     begin(blender, tool_action="FEATURE")
-    place = (0.6 * math.cos(MARGIN_ANGLE), 0.6 * math.sin(MARGIN_ANGLE))
-    click_seen(blender, blender.do(f"value = helper.above({[place]}, 'Tooth')"), "Tooth")
+    blender.click(beside_margin(blender))
+    blender.wait("helper.curve() is not None and helper.count() > 2", "the margin")
     change(blender, tool_action="POINTS")
     begun = time.monotonic()
     blender.do(
