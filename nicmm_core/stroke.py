@@ -146,13 +146,17 @@ def fitted_points(
             f"points[{worst}] is {away[worst]:g} off the surface, more than the tolerance "
             f"({tolerance:g}); move the stroke onto the surface, or use a greater tolerance"
         )
-    places = _smoothed(stroke, tolerance, closed)
-    fit = _Fit(mesh, places, _sampled(stroke, tolerance, closed), tolerance, closed, design)
-    on_surface = nearest_points(mesh, places)[0]
-    normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
-    begin = _fewest_knots(places, normals, tolerance, closed)
-    found = fit.refined(begin, max(MOST_POINTS, 2 * len(begin)), MOST_ROUNDS)
-    if found is None:
+    samples = _sampled(stroke, tolerance, closed)
+    for corners in (False, True):
+        places = _smoothed(stroke, tolerance, closed, corners)
+        fit = _Fit(mesh, places, samples, tolerance, closed, design)
+        on_surface = nearest_points(mesh, places)[0]
+        normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
+        begin = _fewest_knots(places, normals, tolerance, closed)
+        found = fit.refined(begin, max(MOST_POINTS, 2 * len(begin)), MOST_ROUNDS)
+        if found is not None:
+            break
+    else:
         raise UnreachableError(
             f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
             "which may cross itself or leave the surface; draw it again, or use a greater tolerance"
@@ -253,10 +257,11 @@ def _some_of(knots: IntArray, closed: bool) -> IntArray:
     return knots[np.unique(chosen.astype(np.int64))]
 
 
-def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
+def _smoothed(stroke: FloatArray, tolerance: float, closed: bool, corners: bool) -> FloatArray:
     """Places on a smooth line near a stroke, evenly spaced, (m, 3).
 
-    A closed line ends before its first place.
+    A closed line ends before its first place. With `corners`, the stroke is smoothed less where
+    that keeps the line near its corners.
     """
     line = np.concatenate([stroke, stroke[:1]]) if closed else stroke
     degree = min(3, len(line) - 1)
@@ -268,7 +273,7 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool) -> FloatArray:
     for smoothing in np.append(squares * 0.25 ** np.arange(SMOOTHINGS), 0.0):
         spline, _ = splprep(line.T, w=weights, s=smoothing, k=degree, per=closed)
         fine = np.stack(splev(share, spline), axis=1)
-        if cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance:
+        if not corners or cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance:
             break
     arcs = _arcs(fine)
     count = int(np.clip(2.0 * arcs[-1] / tolerance, PLACES, MOST_PLACES))
