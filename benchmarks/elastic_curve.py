@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from nicmm_core.geometry.array_types import FloatArray, IntArray
-from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.curve import SurfaceCurve, arc_lengths
 from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from nicmm_core.geometry.mesh import Mesh
 
@@ -165,7 +165,7 @@ class _Iteration:
         its corners would distort the result.
         """
         line = self.line(self.state.points)
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        arc = arc_lengths(np.diff(line, axis=0))
         spline = CubicSpline(arc, line, bc_type="periodic" if self.closed else "natural")
         count = REFINEMENT * (len(line) - 1) + (not self.closed)
         fine = np.interp(np.arange(count) / REFINEMENT, range(len(arc)), arc)
@@ -261,7 +261,7 @@ def _respaced(legs: list[FloatArray], counts: IntArray) -> FloatArray:
     """Nodes that are evenly spaced on each leg, without the last point of the leg."""
     nodes = []
     for leg, count in zip(legs, counts, strict=True):
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(leg, axis=0), axis=1))])
+        arc = arc_lengths(np.diff(leg, axis=0))
         wanted = np.arange(count) * arc[-1] / count
         nodes.append(np.stack([np.interp(wanted, arc, leg[:, axis]) for axis in range(3)], axis=1))
     return np.concatenate(nodes)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve
+from .geometry.curve import SurfaceCurve, arc_lengths
 from .geometry.surface_points import nearest_points
 from .relaxation.curve_energies import scaled_bending
 from .relaxation.curve_nodes import CurveSurface
@@ -71,7 +71,7 @@ def _nodes(
     controls = (control_index - (control_index[0] if closed else 0)) % len(points)
     if closed:
         line, controls = np.concatenate([line, line[:1]]), np.append(controls, len(line))
-    arcs = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    arcs = arc_lengths(np.diff(line, axis=0))
     ends = arcs[controls]
     counts = np.rint(NODES * np.diff(ends) / arcs[-1]).astype(int).clip(FEWEST_NODES)
     legs = zip(ends[:-1], ends[1:], counts, strict=True)

@@ -226,7 +226,7 @@ class _EdgeGraph:
     def loop(
         self, feature: _Feature, place: FloatArray, size: float, across_gaps: bool
     ) -> IntArray | None:
-        """The vertices of the loop along a feature through a place; None if there is none."""
+        """The vertices of the loop along a feature through a place, or None without a loop."""
         on, costs = feature.strength >= ON, self._costs(feature)
         for gate in GATES:
             crossing = self._crossing(feature, place, gate * size)
@@ -275,17 +275,12 @@ class _EdgeGraph:
         return crosses & near[ends].any(axis=1)
 
     def _path(self, used: BoolArray, costs: FloatArray, start: int, target: int) -> IntArray | None:
-        """The cheapest path along some edges; None if there is none."""
-        checkpoint()
-        cost, before = csgraph.dijkstra(
-            self.matrix(used, costs), indices=start, return_predecessors=True
-        )
+        """The cheapest path along some edges, of two or more; None where they do not join."""
+        cost, before = self._cheapest(used, costs, start)
         if not np.isfinite(cost[target]):
             return None
-        path = [target]
-        while path[-1] != start:
-            path.append(int(before[path[-1]]))
-        return np.array(path[::-1], dtype=np.int64) if len(path) > 2 else None
+        path = _path_to(target, start, before)
+        return path if len(path) > 2 else None
 
     def _share_on(self, path: IntArray, on: BoolArray) -> float:
         """The part of a path, by its length, that is on the feature."""
@@ -298,14 +293,26 @@ class _EdgeGraph:
 
     def _farthest(self, used: BoolArray, costs: FloatArray, start: int) -> IntArray:
         """The path from a vertex along some edges to the farthest vertex that they reach."""
+        cost, before = self._cheapest(used, costs, start)
+        return _path_to(int(np.where(np.isfinite(cost), cost, -1.0).argmax()), start, before)
+
+    def _cheapest(
+        self, used: BoolArray, costs: FloatArray, start: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Cost of the cheapest path from a vertex to each one, and the vertex before it there."""
         checkpoint()
         cost, before = csgraph.dijkstra(
             self.matrix(used, costs), indices=start, return_predecessors=True
         )
-        path = [int(np.where(np.isfinite(cost), cost, -1.0).argmax())]
-        while path[-1] != start:
-            path.append(int(before[path[-1]]))
-        return np.array(path[::-1], dtype=np.int64)
+        return cost, before
+
+
+def _path_to(vertex: int, start: int, before: IntArray) -> IntArray:
+    """The vertices of a path from a start, given the vertex before each one."""
+    path = [vertex]
+    while path[-1] != start:
+        path.append(int(before[path[-1]]))
+    return np.array(path[::-1], dtype=np.int64)
 
 
 def _best_line(

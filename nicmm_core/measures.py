@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike
 
 from .errors import ArgumentError, CurveError
 from .geometry.array_types import BoolArray, FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, checked_curve, resample
+from .geometry.curve import (
+    SurfaceCurve,
+    arc_lengths,
+    checked_curve,
+    leg_lengths,
+    resample,
+    weights_in_faces,
+)
 from .geometry.geodesic_curvature import geodesic_curvature
 from .geometry.mesh import Mesh, edge_lengths, real_array
 from .geometry.segment_distances import FaceSegments, SegmentDistances
@@ -20,7 +27,7 @@ from .outputs.cut import cut_mesh
 from .outputs.region import enclosed_region
 from .repair.free_surface import HARD
 from .repair.mapped_mesh import MappedMesh
-from .splines.offset import surface_normals
+from .repair.surface_normals import surface_normals
 
 WINDOW = 3.0
 """Least distance of the samples at which curvature is measured, in mean edge lengths along the
@@ -117,20 +124,6 @@ def checked_up(up: ArrayLike) -> FloatArray:
     return direction / size / float(np.linalg.norm(direction / size))
 
 
-def leg_lengths(curve: SurfaceCurve) -> FloatArray:
-    """Lengths between consecutive control points, (k,) if the curve is closed, else (k - 1,).
-
-    A leg of a closed curve with a single control point is the whole curve.
-    """
-    arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(curve.steps, axis=1))])
-    passed = np.sort(curve.control_index[curve.control_index >= 0])
-    at = arcs[passed]
-    legs: FloatArray = np.diff(at)
-    if curve.closed and len(at):
-        legs = np.append(legs, arcs[-1] - at[-1] + at[0])
-    return legs
-
-
 def enclosed_area(mesh: Mesh, curve: SurfaceCurve) -> float | None:
     """Area of the smaller side of a curve, or None if it bounds no region."""
     if not curve.closed:
@@ -166,23 +159,16 @@ def _places(
     mesh: Mesh, curve: SurfaceCurve, faces: IntArray, segment: IntArray, points: FloatArray
 ) -> tuple[IntArray, FloatArray]:
     """Faces and barycentric coordinates of points on segments of a curve."""
-    corners = mesh.vertices[mesh.faces[faces[segment]]]
-    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    to_point = points - corners[:, 0]
-    gram = np.stack(
-        [
-            np.stack([(one * one).sum(axis=1), (one * other).sum(axis=1)], axis=1),
-            np.stack([(one * other).sum(axis=1), (other * other).sum(axis=1)], axis=1),
-        ],
-        axis=1,
+    following = (segment + 1) % len(curve.faces)
+    there = faces[segment]
+    begin, end = (
+        weights_in_faces(mesh, curve.faces[each], curve.barycentric[each], there)
+        for each in (segment, following)
     )
-    right = np.stack([(one * to_point).sum(axis=1), (other * to_point).sum(axis=1)], axis=1)
-    flat = np.linalg.det(gram) <= TINY
-    gram[flat] = np.eye(2)
-    found = np.linalg.solve(gram, right[:, :, None])[:, :, 0].clip(0.0, 1.0)
-    found[flat] = 0.0
-    weights = np.column_stack([1.0 - found.sum(axis=1), found]).clip(0.0)
-    return faces[segment], weights / weights.sum(axis=1, keepdims=True)
+    length = np.linalg.norm(curve.steps[segment], axis=1)
+    along = np.linalg.norm(points - curve.points[segment], axis=1)
+    share = (along / np.maximum(length, TINY)).clip(0.0, 1.0)[:, None]
+    return there, (1.0 - share) * begin + share * end
 
 
 def _tangents(points: FloatArray, closed: bool) -> FloatArray:
@@ -211,7 +197,7 @@ def _near_corners(samples: CurvatureSamples, curve: SurfaceCurve, corners: IntAr
     near = np.zeros(len(samples.points), dtype=bool)
     if not len(corners):
         return near
-    arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(curve.steps, axis=1))])
+    arcs = arc_lengths(curve.steps)
     at = arcs[curve.control_index[corners]]
     own = np.linspace(0.0, arcs[-1], len(near), endpoint=not curve.closed)
     away = np.abs(own[:, None] - at)

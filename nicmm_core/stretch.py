@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, points_of_leg
-from .geometry.curve_places import CurvePlace, nearest_place, number_of_legs
+from .geometry.curve import SurfaceCurve, leg_lengths
+from .geometry.curve_places import CurvePlace, nearest_place
 from .geometry.mesh import Mesh
 
 
@@ -44,7 +44,7 @@ def stretch_between(mesh: Mesh, curve: SurfaceCurve, start: FloatArray, end: Flo
         Positions near the curve at which the stroke begins and ends.
     """
     places = nearest_place(mesh, curve, start), nearest_place(mesh, curve, end)
-    legs = _leg_lengths(curve)
+    legs = leg_lengths(curve)
     arcs = [float(legs[: place.leg].sum() + place.share * legs[place.leg]) for place in places]
     count = len(curve.control_index)
     if not curve.closed:
@@ -62,12 +62,3 @@ def _kept(first: CurvePlace, last: CurvePlace, count: int) -> IntArray:
     is_same = last.leg == first.leg and last.share >= first.share
     number = count if is_same else (first.leg - last.leg) % count
     return (last.leg + 1 + np.arange(number)) % count
-
-
-def _leg_lengths(curve: SurfaceCurve) -> FloatArray:
-    """Length of the leg that begins at each control point, 0 at the end of an open curve."""
-    found = np.zeros(len(curve.control_index))
-    for leg in range(number_of_legs(curve)):
-        steps = np.diff(curve.points[points_of_leg(curve, leg)], axis=0)
-        found[leg] = np.linalg.norm(steps, axis=1).sum()
-    return found

@@ -24,13 +24,13 @@ from scipy.spatial import cKDTree
 from .arguments import checked_number
 from .errors import ArgumentError, ControlPointError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve
+from .geometry.curve import SurfaceCurve, arc_lengths
 from .geometry.mesh import Mesh, real_array
 from .geometry.surface_points import SurfacePoints, nearest_points, snapped
 from .geometry.tolerances import COINCIDENT
 from .options import FEWEST_CLOSED, FEWEST_OPEN
 from .progress import checkpoint
-from .splines.offset import surface_normals
+from .repair.surface_normals import surface_normals
 
 SMOOTHING = 0.35
 """Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
@@ -275,15 +275,10 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool, corners: bool)
         fine = np.stack(splev(share, spline), axis=1)
         if not corners or cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance:
             break
-    arcs = _arcs(fine)
+    arcs = arc_lengths(np.diff(fine, axis=0))
     count = int(np.clip(2.0 * arcs[-1] / tolerance, PLACES, MOST_PLACES))
     wanted = np.linspace(0.0, arcs[-1], count, endpoint=not closed)
     return np.stack([np.interp(wanted, arcs, fine[:, axis]) for axis in range(3)], axis=1)
-
-
-def _arcs(line: FloatArray) -> FloatArray:
-    """Length of a polyline up to each of its points."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
 
 
 def _fewest_knots(
@@ -363,7 +358,7 @@ def _off_spline(
 def _sampled(line: FloatArray, tolerance: float, closed: bool) -> FloatArray:
     """Points of a polyline that are much closer to each other than the tolerance."""
     whole = np.concatenate([line, line[:1]]) if closed else line
-    arcs = _arcs(whole)
+    arcs = arc_lengths(np.diff(whole, axis=0))
     count = int(np.clip(arcs[-1] / (DENSE * tolerance), len(whole), MOST_SAMPLES))
     at = np.union1d(np.linspace(0.0, arcs[-1], count), arcs)
     return np.stack([np.interp(at, arcs, whole[:, axis]) for axis in range(3)], axis=1)

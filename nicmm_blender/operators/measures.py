@@ -31,7 +31,7 @@ COMB = 0.1
 
 @dataclass(frozen=True)
 class Measured:
-    """Measures of the curves of an object, or why there are none.
+    """Measures of the curves of an object, or why they cannot be computed.
 
     Attributes
     ----------

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
@@ -13,9 +13,7 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ..outputs import curve_object, edited_curve
 from ..scene import curve_record, mesh_data
-from ..scene.control_points import ControlPoints
 from ..scene.messages import InputError, counted, user_message
-from ..scene.via_points import no_via_points
 from . import polls
 from .answers import answer_now
 from .error_reports import with_error_reports
@@ -73,6 +71,8 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
         return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context: bpy.types.Context) -> set[str]:
+        from ... import nicmm_core as nicmm
+
         mesh_object = mesh_data.mesh_object(context)
         sources = _sources(context)
         strokes = [stroke for source in sources for stroke in strokes_of(context, source)]
@@ -82,11 +82,10 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
         for stroke in strokes:
             try:
                 made.append(self._design(context, mesh_object, stroke))
-            except Exception as error:
-                text = _text_of(error)
-                if text is None:
-                    raise
-                remarks.append(f'"{stroke.name}": {text}')
+            except InputError as error:
+                remarks.append(f'"{stroke.name}": {error}')
+            except nicmm.NicmmError as error:
+                remarks.append(f'"{stroke.name}": {user_message(error)}')
         if not made:
             raise InputError("; ".join(remarks))
         if not self.keep_original and not remarks:
@@ -110,15 +109,6 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
         return made
 
 
-def _text_of(error: Exception) -> str | None:
-    """The message of an error about a stroke; None for any other error."""
-    from ... import nicmm_core as nicmm
-
-    if isinstance(error, InputError):
-        return str(error)
-    return user_message(error) if isinstance(error, nicmm.NicmmError) else None
-
-
 def _sources(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected objects with strokes, without designed curves."""
     return [
@@ -135,9 +125,7 @@ def _through(opened: Opened, stroke: Stroke, tolerance: float) -> Opened:
     local = stroke.points @ back[:3, :3].T + back[:3, 3]
     given = local @ surface.local_to_core.T
     found = edited_curve.points_along(opened, given, tolerance, stroke.closed)
-    points = ControlPoints(found, np.zeros(len(found), dtype=bool))
-    settings = opened.settings.with_value("closed", stroke.closed)
-    return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)
+    return edited_curve.new_through(opened, found, stroke.closed)
 
 
 def strokes_of(context: bpy.types.Context, source: bpy.types.Object) -> Iterator[Stroke]:

@@ -137,7 +137,7 @@ def _offset_points(
     """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)
-    from ...nicmm_core.splines.offset import offset_points
+    from ...nicmm_core.splines.normal_offset import offset_points
 
     # A reflection turns the normals of the core's mesh inwards.
     height = np.sign(np.linalg.det(surface.local_to_core)) * offset / surface.unit

@@ -463,6 +463,13 @@ def points_along(
         return designer.fit_stroke(stroke, within, closed, **shape)
 
 
+def new_through(opened: Opened, places: SurfacePoints, closed: bool) -> Opened:
+    """A new curve through points without corners, on the mesh that was opened for it."""
+    points = ControlPoints(places, np.zeros(len(places), dtype=bool))
+    settings = opened.settings.with_value("closed", closed)
+    return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)
+
+
 def with_point(
     points: ControlPoints, number: int, place: SurfacePoints, replaced: bool = False
 ) -> ControlPoints:

@@ -100,7 +100,7 @@ class NICMM_OT_stroke_curve(ChangesPoints, bpy.types.Operator):
         found = edited_curve.points_along(opened, stroke, self.tolerance, closed)
         if self.redraw:
             return _with_stretch(opened, found, stroke)
-        return _through(opened, found, closed)
+        return edited_curve.new_through(opened, found, closed)
 
 
 class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
@@ -163,7 +163,7 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
             weights = group_weights(opened.mesh_object, self._map, surface.with_modifiers)
         with surface_cache.designer_of(surface) as designer:
             found, closed = designer.feature_loop(place, weights=weights, reach=reach)
-        return _through(opened, found, closed)
+        return edited_curve.new_through(opened, found, closed)
 
 
 def _opened_for(context: bpy.types.Context, curve: bpy.types.Object | None) -> Opened:
@@ -171,13 +171,6 @@ def _opened_for(context: bpy.types.Context, curve: bpy.types.Object | None) -> O
     if curve is not None:
         return edited_curve.open_curve(context, curve)
     return edited_curve.open_new(context)
-
-
-def _through(opened: Opened, places: SurfacePoints, closed: bool) -> Opened:
-    """A new curve through points."""
-    points = ControlPoints(places, np.zeros(len(places), dtype=bool))
-    settings = opened.settings.with_value("closed", closed)
-    return replace(opened, settings=settings, points=points, via=no_via_points(), curve=None)
 
 
 def _with_stretch(opened: Opened, places: SurfacePoints, stroke: np.ndarray) -> Opened:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
+from ..geometry.curve import SurfaceCurve, arc_lengths, checked_curve, weights_in_faces
 from ..geometry.curve_places import nearest_segment
 from ..geometry.mesh import Mesh
 from ..geometry.segment_distances import FaceSegments
@@ -57,7 +57,7 @@ class Avoided:
     @cached_property
     def arcs(self) -> FloatArray:
         """Arc length at the beginning of each segment, and the total length."""
-        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(self.curve.steps, axis=1))])
+        return arc_lengths(self.curve.steps)
 
     def pieces(self, mesh: Mesh, breaks: FloatArray) -> tuple[FaceSegments, FloatArray]:
         """The segments of the curve, divided at some arc lengths.

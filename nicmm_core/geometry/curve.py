@@ -157,6 +157,26 @@ def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
+def arc_lengths(steps: FloatArray) -> FloatArray:
+    """Arc length of a polyline at each of its points, (n + 1,), from its steps, (n, 3)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+
+
+def leg_lengths(curve: SurfaceCurve) -> FloatArray:
+    """Lengths between consecutive control points, (k,) if the curve is closed, else (k - 1,).
+
+    On a closed curve, the first leg begins at the first control point. A leg of a closed curve with
+    a single control point is the whole curve. Control points that the curve misses do not count.
+    """
+    arcs = arc_lengths(curve.steps)
+    passed = curve.control_index[curve.control_index >= 0]
+    at = arcs[np.sort(passed)]
+    if not curve.closed:
+        return np.diff(at)
+    legs = np.diff(at, append=at[:1] + arcs[-1])
+    return np.roll(legs, -int((passed < passed[:1]).sum()))
+
+
 def points_of_leg(curve: SurfaceCurve, leg: int) -> IntArray:
     """Indices of the points of a leg, from its control point to the next one, both included."""
     index, count = curve.control_index, len(curve.faces)
@@ -334,7 +354,7 @@ def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[Float
         Index of the segment that contains each sample.
     """
     line = np.concatenate([points, points[:1]]) if closed else points
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    arc = arc_lengths(np.diff(line, axis=0))
     wanted = np.linspace(0.0, arc[-1], count, endpoint=not closed)
     even = np.stack([np.interp(wanted, arc, line[:, axis]) for axis in range(3)], axis=1)
     segment = np.clip(np.searchsorted(arc, wanted, side="right") - 1, 0, len(line) - 2)

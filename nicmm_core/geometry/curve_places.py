@@ -13,6 +13,7 @@ import numpy as np
 from .array_types import FloatArray
 from .curve import (
     SurfaceCurve,
+    arc_lengths,
     leg_of_segment,
     point_on_segment,
     points_of,
@@ -125,7 +126,7 @@ def nearest_place(mesh: Mesh, curve: SurfaceCurve, position: FloatArray) -> Curv
 def _arcs(curve: SurfaceCurve, leg: int) -> FloatArray:
     """Length of a leg from its beginning to each of its points."""
     steps = np.diff(curve.points[points_of_leg(curve, leg)], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    return arc_lengths(steps)
 
 
 def nearest_segment(curve: SurfaceCurve, position: FloatArray) -> tuple[int, float, float]:

@@ -20,7 +20,7 @@ import numpy as np
 from ..arguments import checked_number
 from ..errors import ArgumentError, CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, curve_on_mesh, without_small_weights
+from ..geometry.curve import SurfaceCurve, arc_lengths, curve_on_mesh, without_small_weights
 from ..geometry.mesh import Mesh, real_array
 from ..geometry.orientation import turned_faces
 from ..geometry.segment_distances import FaceSegments, SegmentDistances, segments_of
@@ -255,7 +255,7 @@ def _offsets(
 
 def _knots(curve: SurfaceCurve, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Arc lengths at which widths are given, ascending, and the widths there."""
-    arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(curve.steps, axis=1))])
+    arcs = arc_lengths(curve.steps)
     passed = curve.control_index[curve.control_index >= 0]
     order = np.argsort(passed, kind="stable")
     knots, widths = arcs[passed[order]], widths[order]

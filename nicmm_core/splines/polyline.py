@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import arc_lengths
 
 CORNER = np.radians(30.0)
 """Turn at one place, in radians, above which a polyline has a corner there."""
@@ -109,7 +110,7 @@ def cut_polyline(points: FloatArray, closed: bool, control_index: IntArray) -> C
         vertex = (controls[0] + np.arange(n + 1)) % n
         bounds = np.append(controls - controls[0], n)
     line = points[vertex]
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    arc = arc_lengths(np.diff(line, axis=0))
     return CutPolyline(line, arc, closed, vertex, bounds)
 
 

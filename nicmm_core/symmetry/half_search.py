@@ -15,7 +15,7 @@ import numpy as np
 from ..courses.hop_graph import distances_along_edges
 from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve
+from ..geometry.curve import SurfaceCurve, arc_lengths
 from ..geometry.mesh import Mesh
 from ..geometry.mirror import ON_PLANE
 from ..geometry.numbering import Renumbered, renumbered
@@ -180,7 +180,7 @@ def _on_whole(half: HalfMesh, copy: Renumbered, curve: DiscreteCurve, controls: 
     control, is_node = np.full(len(polyline), -1), np.zeros(len(polyline), dtype=bool)
     control[curve.node_index[curve.control_nodes]], is_node[curve.node_index] = controls, True
     positions = polyline.positions(copy.mesh)
-    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
+    arc = arc_lengths(np.diff(positions, axis=0))
     trimmed = 2.0 * TRIMMED * arc[-1]
     kept = (arc > trimmed) | (controls[0] >= 0)
     kept &= (arc < arc[-1] - trimmed) | (controls[-1] >= 0)

@@ -5,7 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from nicmm_core import SurfaceCurve
-from nicmm_core.geometry.curve import along_leg, curve_on_mesh, points_of_leg, resample
+from nicmm_core.geometry.curve import (
+    along_leg,
+    curve_on_mesh,
+    leg_lengths,
+    points_of_leg,
+    resample,
+)
 from nicmm_core.geometry.geodesic_curvature import geodesic_curvature
 from tests.core.checks import circle, random_surface_points
 
@@ -125,3 +131,21 @@ def test_positions_along_a_leg_are_those_of_the_nearest_points(square):
     positions = np.array([[-0.5, 1.5, 0.0], [0.25, -0.25, 0.0], [0.0, 3.0, 0.0], [9.0, 0.0, 0.0]])
     np.testing.assert_allclose(along_leg(square, 2, positions), [0.5, 2.25, 0.0, 3.0])
     assert len(along_leg(square, 0, np.zeros((0, 3)))) == 0
+
+
+@pytest.mark.parametrize(
+    ("closed", "control_index", "expected"),
+    [
+        (True, [0, 1, 2], [1.0, 2.0, 3.0]),
+        (True, [1, 2, 0], [2.0, 3.0, 1.0]),
+        (True, [1, -1, 0], [5.0, 1.0]),
+        (True, [2], [6.0]),
+        (True, [-1], []),
+        (False, [0, 2], [3.0]),
+    ],
+)
+def test_leg_lengths(closed, control_index, expected):
+    # The sides have the lengths 1, 2 and 3, so the triangle has no area.
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
+    curve = SurfaceCurve(closed, np.zeros(3, int), np.eye(3), points, np.array(control_index))
+    np.testing.assert_allclose(leg_lengths(curve), expected, atol=1e-12)

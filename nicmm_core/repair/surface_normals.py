@@ -1,4 +1,4 @@
-"""Computes normals of the surface at points, and points at a given height above it."""
+"""Unit normals of the surface at points, whatever the orientation of single faces."""
 
 from __future__ import annotations
 
@@ -8,31 +8,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import vertex_normals
 from ..geometry.orientation import turned, turned_faces
-from ..geometry.surface_points import SurfacePoints
-from ..repair.clean_surface import joined_surface
-
-
-def offset_points(
-    mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float
-) -> FloatArray:
-    """Positions of points of a mesh, moved along `surface_normals`.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    faces : (n,) int array
-        The face in which each point lies.
-    barycentric : (n, 3) float array
-        Coordinates in these faces.
-    height : float
-        In mesh units; negative towards the inside.
-
-    Returns
-    -------
-    (n, 3) float array
-    """
-    normals = surface_normals(mesh, faces, barycentric)
-    return SurfacePoints(faces, barycentric).positions(mesh) + height * normals
+from .clean_surface import joined_surface
 
 
 def surface_normals(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> FloatArray:

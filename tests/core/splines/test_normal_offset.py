@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.splines.offset import offset_points
+from nicmm_core.splines.normal_offset import offset_points
 from tests.core.checks import random_surface_points
 from tests.oracles import same_surface
 
