@@ -23,6 +23,13 @@ FURTHER_BENDING = 20.0
 WORST = 10.0
 """Factor of that bound above which a curve certainly makes a detour."""
 
+UNEVEN = 8.0
+"""Increase of L ∮ κ_g² ds above which a curve has become uneven, a fifth of the value of a circle.
+
+Beside a bent line at the clearance of an avoided curve, where nodes hardly move, a curve may remain
+uneven; then a new curve is fairer.
+"""
+
 
 class ContinuedCurve(NamedTuple):
     """A curve to which a start has led.
@@ -66,3 +73,8 @@ def chosen(
     energies = energies_of(found[0].start.surface, curves, request.smoothness)
     weighted = [energy * GAIN**each.given_up for energy, each in zip(energies, found, strict=True)]
     return found[weighted.index(min(weighted))]
+
+
+def is_uneven(before: DiscreteCurve, after: DiscreteCurve) -> bool:
+    """Whether a curve bends far more than the one from which it was continued."""
+    return scaled_bending(after) - scaled_bending(before) > UNEVEN

@@ -39,8 +39,8 @@ from .arguments import (
 from .avoidance.avoided_curve import Avoided, avoided_curves
 from .avoidance.contacts import is_too_close, meeting_only_at_junctions, meets
 from .blas_threads import single_blas_thread
+from .continued import is_uneven
 from .design_result import Design, cancelled_design, with_curves_of_designs
-from .displaced_start import is_uneven
 from .errors import ArgumentError, CurveError, UnreachableError
 from .feature_lines import feature_line
 from .geometry.array_types import FloatArray
@@ -76,7 +76,7 @@ from .repaired_surface import (
 from .request import Request, same_request
 from .start import WITHOUT_START
 from .status import Status
-from .stroke import checked_stroke, fitted_points
+from .stroke import Along, checked_stroke, fitted_points
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,
@@ -348,17 +348,33 @@ class Designer:
             raise ArgumentError(f"closed is {closed!r}; pass True or False")
         stroke, within = checked_stroke(self.mesh, points, tolerance, bool(closed))
 
-        def design(controls: SurfacePoints, start: SurfaceCurve | None) -> SurfaceCurve:
-            found = self.design(
-                controls,
-                closed=bool(closed),
-                smoothness=smoothness,
-                normal_bending=normal_bending,
-                start=start,
-            )
-            return only_curve(found, "design")
+        given: dict[str, Any] = {
+            "closed": bool(closed),
+            "smoothness": smoothness,
+            "normal_bending": normal_bending,
+        }
+
+        def design(controls: SurfacePoints, along: Along | None) -> SurfaceCurve:
+            if along is None:
+                return only_curve(self.design(controls, **given), "design")
+            return self._relaxed_along(controls, along, given)
 
         return fitted_points(self.mesh, stroke, within, bool(closed), design)
+
+    def _relaxed_along(
+        self, controls: SurfacePoints, along: Along, given: dict[str, Any]
+    ) -> SurfaceCurve:
+        """The curve through control points, relaxed from a line near the surface."""
+        unset = {option.name: option.default for option in OPTIONS}
+        with single_blas_thread(), self._exclusive():
+            request = self._request(controls, checked_options(self.mesh, unset | given))
+            manifold, there = self._on_manifold(request)
+            line = manifold.from_original(along.line)
+            begin = manifold.curve_along(line, request.closed, along.control_index)
+            if begin is None:
+                raise CurveError("the line cannot be traced on the surface")
+            found = manifold.designer.design(there, time.perf_counter(), begin)
+            return only_curve(manifold.design_on_original(found, request), "design")
 
     def feature_loop(
         self,

@@ -46,6 +46,12 @@ The fairest curve then bends more along the surface in order to bend less with i
 WITH_AVOIDED_CURVES = 2.5
 """Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
 
+FEWEST_FOR_SPLINE = 6
+"""Least number of control points for which the spline through them is tried.
+
+Through fewer points, hardly any spline was better than the best course.
+"""
+
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
@@ -121,8 +127,9 @@ class Improvement:
         The start and the result of each attempt.
     searches, parts : int
         Numbers of searches for courses begun so far, of the whole curve and of parts.
-    repeat_found_same_curve : bool
-        Whether the last repeated search has found the best curve of before once more.
+    repeat_found_same_curve, spline_found_same_curve : bool
+        Whether the last repeated search, or the spline, has found the best curve of before once
+        more.
     """
 
     search: StartSearch
@@ -134,6 +141,7 @@ class Improvement:
     searches: int = 1
     parts: int = 0
     repeat_found_same_curve: bool = False
+    spline_found_same_curve: bool = False
 
     def attempt(self, start: InitialCurve, config: RelaxationConfig) -> None:
         """Relax a start."""
@@ -154,12 +162,14 @@ class Improvement:
         """
         request = self.request
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
+        if len(request.points) >= FEWEST_FOR_SPLINE and not request.via_points:
+            self._try_spline()
         if by_course:
             self._try_other_courses(courses)
             for repeated in further:
                 if not (self._should_search_again() and self._try_courses(repeated)):
                     break
-            self._try_other_parts()
+        self._try_other_parts()
         if self._should_tighten():
             self.attempt(self.starts[self.best], self._limited(TIGHTENED))
         if by_course and self._should_try_path():
@@ -181,6 +191,14 @@ class Improvement:
         """Settings with at most the work that is left."""
         return self._limited(relaxation_config(self.request))
 
+    def _try_spline(self) -> None:
+        """Try the spline through the control points, in the order of the first start."""
+        start = self.search.by_spline(self.request, self.starts[0].visited)
+        if start is not None:
+            before = len(self.starts)
+            self.attempt(start, self._config)
+            self.spline_found_same_curve = self._found_same_curve(before)
+
     def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.
 
@@ -193,7 +211,7 @@ class Improvement:
             return False
         self.attempt(start, self._config)
         self._try_other_courses(courses)
-        self._end_repeated_search(before)
+        self.repeat_found_same_curve = self._found_same_curve(before)
         return True
 
     def _try_other_courses(self, courses: Iterator[InitialCurve]) -> None:
@@ -282,13 +300,13 @@ class Improvement:
         earlier = self.curves[energies.index(least)]
         return least - found > LEAST_GAIN * self._elastic_energy(earlier)
 
-    def _end_repeated_search(self, before: int) -> None:
-        """Record that the courses of a repeated search have been relaxed, from an index on."""
+    def _found_same_curve(self, before: int) -> bool:
+        """Whether the best result from an index on is the best one before it once more."""
         energies, curves = self.energies, self.curves
         earlier = curves[energies.index(min(energies[:before]))]
         latest = curves[before + energies[before:].index(min(energies[before:]))]
         is_same = not is_apart(self._surface, latest, [earlier])
-        self.repeat_found_same_curve = is_same and not self._gained_since(before)
+        return is_same and not self._gained_since(before)
 
     def _should_search_again(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
@@ -297,7 +315,8 @@ class Improvement:
         is still strongly bent and two searches have not found the same curve.
         """
         least = self._bound(SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT)
-        promising = self._bending > least and not self.repeat_found_same_curve
+        found_twice = self.repeat_found_same_curve or self.spline_found_same_curve
+        promising = self._bending > least and not found_twice
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
     def _should_try_another_course(self, first: int) -> bool:
@@ -308,7 +327,8 @@ class Improvement:
 
     def _should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
-        return self._bending > self._bound(BENT) and self._is_affordable(WORK_OF_PART)
+        promising = self._bending > self._bound(BENT) and not self.spline_found_same_curve
+        return promising and self._is_affordable(WORK_OF_PART)
 
     def _should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""

@@ -23,7 +23,6 @@ import numpy as np
 from .avoidance.avoided_curve import Avoided
 from .avoidance.off_curves import check_off_curves, surface_off_curves
 from .design_result import Design
-from .displaced_start import displaced
 from .errors import CurveError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
@@ -32,6 +31,7 @@ from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, coincide, joined
 from .path.via_points import with_via_points
+from .relaxation.curve_along import curve_along
 from .repair.clean_surface import CleanSurface
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
@@ -130,14 +130,24 @@ class Manifold:
         points = curve.points
         for copy in copies:
             points = copy.from_original(points)
-        surface = self.designer.surface.without_maps
-        moved = displaced(surface, points, curve.closed, curve.control_index)
+        moved = self.curve_along(points, curve.closed, curve.control_index)
         if moved is None:
             raise CurveError(
                 "start crosses a curve of avoid, or comes much closer to one than the clearance"
                 f"{WITHOUT_START}"
             )
         return moved
+
+    def curve_along(
+        self, points: FloatArray, closed: bool, control_index: IntArray
+    ) -> SurfaceCurve | None:
+        """A simple curve along a polyline in the coordinates of the designer's mesh, (n, 3).
+
+        None if there is no such curve near the polyline.
+        """
+        surface = self.designer.surface.without_maps
+        found = curve_along(surface, points, closed, control_index)
+        return None if found is None else found.surface_curve(self.mesh)
 
     def design_on_original(self, design: Design, request: Request) -> Design:
         """Map a design to the given mesh, on which it is requested.

@@ -21,7 +21,9 @@ from .geometry.mesh import Mesh
 from .mapped_surface import MappedSurface
 from .new_legs import Leg, request_for_leg, with_new_legs
 from .path.initial_path import find_initial_path, path_curve
+from .path.spline_path import spline_samples
 from .progress import checkpoint
+from .relaxation.curve_along import curve_along
 from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
@@ -161,6 +163,19 @@ class StartSearch:
             request.via_points,
         )
         return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.surface.unit)
+
+    def by_spline(self, request: Request, visited: IntArray) -> InitialCurve | None:
+        """The spline through the control points in an order, on the nearest places of the mesh.
+
+        None if the surface is too far away from it, or has no simple curve there.
+        """
+        surface, points = self.surface.of(request), request.points[visited]
+        corners, closed = request.are_corners(visited), request.closed
+        line, at_points = spline_samples(points.positions(self.mesh), closed, corners)
+        curve = curve_along(surface, line, closed, at_points, points)
+        if curve is None:
+            return None
+        return InitialCurve(curve.with_corners(corners), visited, surface, self.surface.unit)
 
     def _joined_courses(
         self, request: Request, seed: int, search_size: SearchSize

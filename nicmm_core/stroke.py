@@ -2,23 +2,23 @@
 
 The stroke is smoothed by a spline, and control points are places on it:
 
-1. The first ones are the fewest whose natural cubic spline stays near the stroke, since it bends
-   like the curve of a design. The curve is designed, and where it leaves the tolerance, a control
-   point is added, until it does not.
-2. These are often more than needed. So with only some of them, the curve is relaxed again from the
-   one found (`start=`), which is fast and keeps its course, and points are added in the same way.
+1. The first guess has the fewest points whose natural cubic spline stays near the stroke, since the
+   curve of a design bends like this spline.
+2. They are often more than needed. So with only some of them, a curve is relaxed from the smoothed
+   stroke, which is fast and keeps its course. Where it leaves the tolerance, a control point is
+   added, until it does not.
 3. The curve through these is designed without a start, as the caller will do. If it takes another
-   course, control points are added, up to the number of the first step.
+   course, control points are added there. If that does not help, the first guess is tried instead.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, splev, splprep
+from scipy.interpolate import splev, splprep
 from scipy.spatial import cKDTree
 
 from .arguments import checked_number
@@ -29,6 +29,7 @@ from .geometry.mesh import Mesh, real_array
 from .geometry.surface_points import SurfacePoints, nearest_points, snapped
 from .geometry.tolerances import COINCIDENT
 from .options import FEWEST_CLOSED, FEWEST_OPEN
+from .path.spline_path import interpolating_spline
 from .progress import checkpoint
 from .repair.surface_normals import surface_normals
 
@@ -51,8 +52,8 @@ MARGIN = 0.6
 """Distance that the spline of the first step keeps from the smoothed stroke, in tolerances. The
 curve of a design differs from it, and the stroke from the smoothed one."""
 
-SPARSE = 3
-"""The second step begins with one of so many control points of the first."""
+SPARSE = 2
+"""The second step begins with one of so many control points of the first guess."""
 
 DENSE = 0.1
 """Distance of the samples between which distances of lines are measured, in tolerances."""
@@ -60,8 +61,9 @@ DENSE = 0.1
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_ROUNDS, MOST_ROUNDS_FROM_START, MOST_CHECKS = 8, 4, 2
-"""Greatest number of curves that are designed in each of the three steps."""
+MOST_RELAXED, MOST_DESIGNED = 8, 4
+"""Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
+are designed without a start in each part of the third one."""
 
 MOST_POINTS = 48
 """Greatest number of control points that are tried, unless the first guess has more than half of
@@ -70,8 +72,16 @@ them. More would take long, and the stroke is then most likely one that no curve
 APART = 3
 """Least number of places between two control points."""
 
-Curves = Callable[[SurfacePoints, SurfaceCurve | None], SurfaceCurve]
-"""Designs the curve through control points, from a start if there is one."""
+
+class Along(NamedTuple):
+    """A line near the surface, (n, 3), and which of its points are control points, (k,)."""
+
+    line: FloatArray
+    control_index: IntArray
+
+
+Curves = Callable[[SurfacePoints, Along | None], SurfaceCurve]
+"""Designs the curve through control points, or relaxes it from a line."""
 
 
 def checked_stroke(
@@ -130,7 +140,7 @@ def fitted_points(
         In mesh units.
     closed : bool
     design : callable
-        Designs the curve through control points, from a start or None.
+        Designs the curve through control points, or relaxes it from a line.
 
     Raises
     ------
@@ -147,25 +157,23 @@ def fitted_points(
             f"({tolerance:g}); move the stroke onto the surface, or use a greater tolerance"
         )
     samples = _sampled(stroke, tolerance, closed)
-    for corners in (False, True):
-        places = _smoothed(stroke, tolerance, closed, corners)
+    for places in _smoothed_lines(stroke, tolerance, closed):
         fit = _Fit(mesh, places, samples, tolerance, closed, design)
         on_surface = nearest_points(mesh, places)[0]
         normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
-        begin = _fewest_knots(places, normals, tolerance, closed)
-        found = fit.refined(begin, max(MOST_POINTS, 2 * len(begin)), MOST_ROUNDS)
+        guess = _fewest_knots(places, normals, tolerance, closed)
+        most = max(MOST_POINTS, 2 * len(guess))
+        found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, True)
         if found is not None:
-            break
-    else:
-        raise UnreachableError(
-            f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
-            "which may cross itself or leave the surface; draw it again, or use a greater tolerance"
-        )
-    knots, curve = found
-    most = len(knots) - 1
-    fewer = fit.refined(_some_of(knots, closed), most, MOST_ROUNDS_FROM_START, curve)
-    checked = None if fewer is None else fit.refined(fewer[0], most, MOST_CHECKS)
-    return fit.points(knots if checked is None else checked[0])
+            found = fit.refined(found, most, MOST_DESIGNED, False)
+        if found is None:
+            found = fit.refined(guess, most, MOST_DESIGNED, False)
+        if found is not None:
+            return fit.points(found)
+    raise UnreachableError(
+        f"no curve was found that stays within the tolerance ({tolerance:g}) of the stroke, "
+        "which may cross itself or leave the surface; draw it again, or use a greater tolerance"
+    )
 
 
 @dataclass(frozen=True)
@@ -183,10 +191,8 @@ class _Fit:
         """The points of the surface at knots, which are indices of places."""
         return snapped(nearest_points(self.mesh, self.places[knots])[0])
 
-    def refined(
-        self, knots: IntArray, most: int, rounds: int, start: SurfaceCurve | None = None
-    ) -> tuple[IntArray, SurfaceCurve] | None:
-        """Knots, with others added until their curve stays near the stroke, and this curve.
+    def refined(self, knots: IntArray, most: int, rounds: int, along: bool) -> IntArray | None:
+        """Knots, with others added until their curve stays near the stroke; None if that fails.
 
         Parameters
         ----------
@@ -195,29 +201,23 @@ class _Fit:
             Greatest number of knots.
         rounds : int
             Greatest number of curves that are designed.
-        start : SurfaceCurve, optional
-            A curve from which each curve is relaxed.
-
-        Returns
-        -------
-        tuple or None
-            None if that fails.
+        along : bool
+            Whether each curve is relaxed from the line through all places.
         """
         for _ in range(rounds):
             checkpoint()
             if len(knots) > most:
                 return None
             try:
-                curve = self.design(self.points(knots), start)
+                line = Along(self.places, knots) if along else None
+                curve = self.design(self.points(knots), line)
             except (ControlPointError, UnreachableError, CurveError):
-                if start is not None:
-                    return None
                 # Two of the points may coincide, or lie on different parts.
                 missing = np.arange(0)
             else:
                 missing = self.missing(knots, curve)
                 if not len(missing):
-                    return knots, curve
+                    return knots
             finer = knots
             for place in missing:
                 finer = _with_knot(finer, len(self.places), self.closed, int(place))
@@ -257,11 +257,11 @@ def _some_of(knots: IntArray, closed: bool) -> IntArray:
     return knots[np.unique(chosen.astype(np.int64))]
 
 
-def _smoothed(stroke: FloatArray, tolerance: float, closed: bool, corners: bool) -> FloatArray:
-    """Places on a smooth line near a stroke, evenly spaced, (m, 3).
+def _smoothed_lines(stroke: FloatArray, tolerance: float, closed: bool) -> Iterator[FloatArray]:
+    """Places on smooth lines near a stroke, evenly spaced, (m, 3).
 
-    A closed line ends before its first place. With `corners`, the stroke is smoothed less where
-    that keeps the line near its corners.
+    A closed line ends before its first place. The first line is smoothed fully. Another follows if
+    that cuts corners off; it is smoothed less.
     """
     line = np.concatenate([stroke, stroke[:1]]) if closed else stroke
     degree = min(3, len(line) - 1)
@@ -270,15 +270,22 @@ def _smoothed(stroke: FloatArray, tolerance: float, closed: bool, corners: bool)
     if not closed:
         weights[[0, -1]] = AT_ENDS
     share = np.linspace(0.0, 1.0, 4 * MOST_PLACES)
-    for smoothing in np.append(squares * 0.25 ** np.arange(SMOOTHINGS), 0.0):
+    for number, smoothing in enumerate(np.append(squares * 0.25 ** np.arange(SMOOTHINGS), 0.0)):
         spline, _ = splprep(line.T, w=weights, s=smoothing, k=degree, per=closed)
         fine = np.stack(splev(share, spline), axis=1)
-        if not corners or cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance:
-            break
-    arcs = arc_lengths(np.diff(fine, axis=0))
+        keeps_corners = cKDTree(fine).query(stroke)[0].max() <= CORNERS * tolerance
+        if number == 0 or keeps_corners or smoothing == 0.0:
+            yield _evenly_spaced(fine, tolerance, closed)
+        if keeps_corners:
+            return
+
+
+def _evenly_spaced(line: FloatArray, tolerance: float, closed: bool) -> FloatArray:
+    """Places on a line, (m, 3); a closed one ends before its first place."""
+    arcs = arc_lengths(np.diff(line, axis=0))
     count = int(np.clip(2.0 * arcs[-1] / tolerance, PLACES, MOST_PLACES))
     wanted = np.linspace(0.0, arcs[-1], count, endpoint=not closed)
-    return np.stack([np.interp(wanted, arcs, fine[:, axis]) for axis in range(3)], axis=1)
+    return np.stack([np.interp(wanted, arcs, line[:, axis]) for axis in range(3)], axis=1)
 
 
 def _fewest_knots(
@@ -335,20 +342,9 @@ def _off_spline(
     places: FloatArray, normals: FloatArray, knots: IntArray, tolerance: float, closed: bool
 ) -> FloatArray:
     """Distance of each place from the cubic spline through knots, (m,), across the normals."""
-    chosen = places[knots]
-    if closed:
-        chosen = np.concatenate([chosen, chosen[:1]])
-    lengths = np.linalg.norm(np.diff(chosen, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(np.maximum(lengths, np.finfo(float).tiny))])
-    kind = "periodic" if closed else "natural"
-    spline = CubicSpline(along, chosen, bc_type=kind) if len(chosen) > 2 else None
-    count = int(np.clip(along[-1] / (DENSE * tolerance), 2 * len(places), MOST_SAMPLES))
-    share = np.linspace(0.0, along[-1], count)
-    line = (
-        spline(share)
-        if spline is not None
-        else chosen[0] + (share / along[-1])[:, None] * (chosen[1] - chosen[0])
-    )
+    spline = interpolating_spline(places[knots], closed)
+    count = int(np.clip(spline.x[-1] / (DENSE * tolerance), 2 * len(places), MOST_SAMPLES))
+    line = spline(np.linspace(0.0, spline.x[-1], count))
     way = line[cKDTree(line).query(places)[1]] - places
     way -= (way * normals).sum(axis=1, keepdims=True) * normals
     found: FloatArray = np.linalg.norm(way, axis=1)

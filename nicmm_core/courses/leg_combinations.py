@@ -55,7 +55,7 @@ BEAM_WIDTH = 3_000
 """Number of incomplete combinations kept after each leg."""
 
 
-MAX_RELATIVE_COST = 1.5
+MAX_RELATIVE_COST = 2.5
 """Cost of a combination, relative to the cheapest, above which it is not relaxed."""
 
 

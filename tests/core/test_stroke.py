@@ -56,10 +56,10 @@ def test_a_curve_with_normal_bending_stays_near_the_stroke(body):
 
     def away(**shape):
         fitted = designer.fit_stroke(stroke, tolerance, **shape)
-        design = designer.design(fitted, closed=False, normal_bending=0.3)
+        design = designer.design(fitted, closed=False, normal_bending=1.0)
         return farthest(design.curves[0], stroke)
 
-    assert away(normal_bending=0.3) <= tolerance * 1.001
+    assert away(normal_bending=1.0) <= tolerance * 1.001
     assert away() > tolerance
 
 
