@@ -48,19 +48,20 @@ def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
     assert farthest(found, stroke) <= 2.0 * noise * 1.001
 
 
-def test_a_curve_with_normal_bending_stays_near_the_stroke(body):
-    designer, points = nicmm.Designer(body), random_surface_points(body, 4, 1)
-    curve = designer.design(points, closed=False, order="shortest").curves[0]
-    tolerance = 0.02 * body.diagonal
-    stroke = stroke_of(curve, 0.5 * tolerance, 1)
+def test_curves_with_normal_bending_stay_near_their_strokes(body):
+    designer, tolerance = nicmm.Designer(body), 0.02 * body.diagonal
 
-    def away(**shape):
+    def away(seed, **shape):
+        points = random_surface_points(body, 4, seed)
+        curve = designer.design(points, closed=False, order="shortest").curves[0]
+        stroke = stroke_of(curve, 0.5 * tolerance, seed)
         fitted = designer.fit_stroke(stroke, tolerance, **shape)
         design = designer.design(fitted, closed=False, normal_bending=1.0)
         return farthest(design.curves[0], stroke)
 
-    assert away(normal_bending=1.0) <= tolerance * 1.001
-    assert away() > tolerance
+    seeds = range(1, 6)
+    assert max(away(seed, normal_bending=1.0) for seed in seeds) <= tolerance * 1.001
+    assert max(away(seed) for seed in seeds) > tolerance  # the points depend on the shape
 
 
 def test_a_stroke_without_noise_is_followed_closely(ball):
