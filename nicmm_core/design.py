@@ -42,7 +42,6 @@ from .blas_threads import single_blas_thread
 from .continued import is_uneven
 from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, CurveError, UnreachableError
-from .feature_lines import feature_line
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of
 from .geometry.mesh import Mesh
@@ -60,7 +59,7 @@ from .measures import checked_up, measures_of
 from .offsets.curve_offsets import checked_distances, offset_curves
 from .options import OPTIONS
 from .path.via_points import ViaPoints, located_via_points, with_via_points
-from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
+from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, subrange, watched
 from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
@@ -76,7 +75,8 @@ from .repaired_surface import (
 from .request import Request, same_request
 from .start import WITHOUT_START
 from .status import Status
-from .stroke import Along, checked_stroke, fitted_points
+from .strokes.feature_lines import feature_line
+from .strokes.stroke_fit import Line, checked_stroke, fitted_points
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,
@@ -92,6 +92,10 @@ PARTS = (
     "curve cannot pass from one part to the other there; join the parts along an edge, or choose "
     "points on one of them"
 )
+
+
+NO_POINTS = SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+"""The control points of a fit that has been cancelled."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +195,7 @@ class Designer:
             "mirror": mirror,
             "alternatives": alternatives,
         }
-        if progress is not None and not callable(progress):
-            raise ArgumentError(f"progress is {progress!r}; pass a function or None")
+        _check_progress(progress)
         try:
             with watched(progress), single_blas_thread(), self._exclusive():
                 options = checked_options(self.mesh, given)
@@ -338,43 +341,24 @@ class Designer:
         *,
         smoothness: float = 1.0,
         normal_bending: float = 0.0,
+        progress: Progress | None = None,
     ) -> SurfacePoints:
         """The control points that `fit_stroke` finds, as points of the surface.
 
         The curve that stays within the tolerance is the one with the same smoothness and normal
-        bending, since these change its shape between the points.
+        bending, since these change its shape between the points. If the progress function returns
+        False, there are no points.
         """
         if not isinstance(closed, bool | np.bool_):
             raise ArgumentError(f"closed is {closed!r}; pass True or False")
+        _check_progress(progress)
         stroke, within = checked_stroke(self.mesh, points, tolerance, bool(closed))
-
-        given: dict[str, Any] = {
-            "closed": bool(closed),
-            "smoothness": smoothness,
-            "normal_bending": normal_bending,
-        }
-
-        def design(controls: SurfacePoints, along: Along | None) -> SurfaceCurve:
-            if along is None:
-                return only_curve(self.design(controls, **given), "design")
-            return self._relaxed_along(controls, along, given)
-
-        return fitted_points(self.mesh, stroke, within, bool(closed), design)
-
-    def _relaxed_along(
-        self, controls: SurfacePoints, along: Along, given: dict[str, Any]
-    ) -> SurfaceCurve:
-        """The curve through control points, relaxed from a line near the surface."""
-        unset = {option.name: option.default for option in OPTIONS}
-        with single_blas_thread(), self._exclusive():
-            request = self._request(controls, checked_options(self.mesh, unset | given))
-            manifold, there = self._on_manifold(request)
-            line = manifold.from_original(along.line)
-            begin = manifold.curve_along(line, request.closed, along.control_index)
-            if begin is None:
-                raise CurveError("the line cannot be traced on the surface")
-            found = manifold.designer.design(there, time.perf_counter(), begin)
-            return only_curve(manifold.design_on_original(found, request), "design")
+        shape = {"smoothness": smoothness, "normal_bending": normal_bending}
+        try:
+            with watched(progress), single_blas_thread(), self._exclusive():
+                return self._fitted(stroke, within, bool(closed), shape)
+        except CancelledError:
+            return NO_POINTS
 
     def feature_loop(
         self,
@@ -382,11 +366,46 @@ class Designer:
         edges: ArrayLike | None = None,
         weights: ArrayLike | None = None,
         reach: float | None = None,
+        progress: Progress | None = None,
     ) -> tuple[SurfacePoints, bool]:
-        """The control points that `feature_loop` finds, and whether the line is closed."""
-        line = feature_line(self.mesh, point, edges, weights, reach)
-        points = self.fit_stroke(line.points, line.tolerance, line.closed)
-        return points, line.closed
+        """The control points that `feature_loop` finds, and whether the line is closed.
+
+        If the progress function returns False, there are no points.
+        """
+        _check_progress(progress)
+        try:
+            with watched(progress), single_blas_thread(), self._exclusive():
+                line = feature_line(self.mesh, point, edges, weights, reach)
+                stroke, within = checked_stroke(self.mesh, line.points, line.tolerance, line.closed)
+                return self._fitted(stroke, within, line.closed, {}), line.closed
+        except CancelledError:
+            return NO_POINTS, False
+
+    def _fitted(
+        self, stroke: FloatArray, tolerance: float, closed: bool, shape: dict[str, float]
+    ) -> SurfacePoints:
+        """Control points that follow a stroke, for curves with some options."""
+        options = {option.name: option.default for option in OPTIONS}
+        options |= {"closed": closed, **shape}
+        left = 1.0  # of the progress; each curve takes half of it
+
+        def curve_through(points: SurfacePoints, line: Line | None) -> SurfaceCurve | None:
+            nonlocal left
+            request = self._request(points, checked_options(self.mesh, options))
+            manifold, there = self._on_manifold(request)
+            begin = None
+            if line is not None:
+                positions = manifold.from_original(line.positions)
+                begin = manifold.curve_along(positions, closed, line.control_index)
+                if begin is None:
+                    return None
+            with placed(manifold.in_original), subrange(1.0 - left, 1.0 - 0.5 * left):
+                found = manifold.designer.design(there, time.perf_counter(), begin)
+            checkpoint()  # a cancelled design may have an unfinished curve
+            left *= 0.5 if line is None else 1.0
+            return only_curve(manifold.design_on_original(found, request), "design")
+
+        return fitted_points(self.mesh, stroke, tolerance, closed, curve_through)
 
     def measures(
         self,
@@ -520,6 +539,12 @@ class Designer:
         if last is None or not last.is_of(surface, avoided, request.clearance):
             last = self._off_curves = SurfaceOffCurves(surface, avoided, request.clearance)
         return last
+
+
+def _check_progress(progress: object) -> None:
+    """Raise ArgumentError unless a progress function can be called, or is None."""
+    if progress is not None and not callable(progress):
+        raise ArgumentError(f"progress is {progress!r}; pass a function or None")
 
 
 def _check_even(start: Design, design: Design) -> None:
@@ -791,7 +816,12 @@ def offset_curve(
 
 
 def fit_stroke(
-    mesh: Mesh, points: ArrayLike, tolerance: float, *, closed: bool = False
+    mesh: Mesh,
+    points: ArrayLike,
+    tolerance: float,
+    *,
+    closed: bool = False,
+    progress: Progress | None = None,
 ) -> FloatArray:
     """Few control points whose curve follows a stroke, such as a line drawn by hand.
 
@@ -804,6 +834,8 @@ def fit_stroke(
         Greatest distance between the stroke and the curve, in mesh units.
     closed : bool, default False
         Whether the stroke is closed; its last point is then joined to the first.
+    progress : callable, optional
+        As for `design_curve`. If the function returns False, there are no control points.
 
     Returns
     -------
@@ -832,7 +864,7 @@ def fit_stroke(
     >>> len(nicmm.fit_stroke(mesh, stroke, tolerance=0.05)) < 6
     True
     """
-    found = Designer(mesh).fit_stroke(points, tolerance, closed)
+    found = Designer(mesh).fit_stroke(points, tolerance, closed, progress=progress)
     return found.positions(mesh)
 
 
@@ -843,6 +875,7 @@ def feature_loop(
     edges: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     reach: float | None = None,
+    progress: Progress | None = None,
 ) -> FloatArray:
     """Control points of the closed loop along the feature next to a point.
 
@@ -861,6 +894,8 @@ def feature_loop(
         Weights at the vertices; the rim of the region with more than half is followed next.
     reach : float, optional
         Distance from the point within which the feature is looked for; at least four edges.
+    progress : callable, optional
+        As for `design_curve`. If the function returns False, there are no control points.
 
     Returns
     -------
@@ -887,5 +922,5 @@ def feature_loop(
     >>> design.curves[0].closed
     True
     """
-    found, _ = Designer(mesh).feature_loop(point, edges, weights, reach)
+    found, _ = Designer(mesh).feature_loop(point, edges, weights, reach, progress)
     return found.positions(mesh)

@@ -136,7 +136,7 @@ class LongSolves(SlicedOperator[list["Answer"]]):
             self._partial = PartialCurve()
         if len(self._work.polyline):
             request = self._requests[_current_index(self._work.fraction, len(self._requests))]
-            line = request.in_world(self._work.polyline)
+            line = request.surface.in_world(self._work.polyline)
             self._partial.show(line, request.settings.closed)
 
     def tidy(self, context: bpy.types.Context) -> None:

@@ -40,6 +40,7 @@ from .writing import ObjectSettings
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
     from ...nicmm_core.geometry.plane_section import PlaneSection
+    from ...nicmm_core.progress import Progress
     from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
@@ -444,9 +445,13 @@ def nearest_surface_points(edited: Opened, positions: np.ndarray) -> SurfacePoin
 
 
 def points_along(
-    edited: Opened, stroke: np.ndarray, tolerance: float, closed: bool
+    edited: Opened,
+    stroke: np.ndarray,
+    tolerance: float,
+    closed: bool,
+    progress: Progress | None = None,
 ) -> SurfacePoints:
-    """Few points through which a curve with these settings follows a stroke.
+    """Few points through which a curve with these settings follows a stroke; none if cancelled.
 
     Parameters
     ----------
@@ -456,11 +461,12 @@ def points_along(
     tolerance : float
         Greatest distance between the stroke and the curve, in the scene.
     closed : bool
+    progress : callable, optional
     """
     shape = {name: getattr(edited.settings, name) for name in SAME_COURSE}
     within = tolerance / edited.surface.unit
     with surface_cache.designer_of(edited.surface) as designer:
-        return designer.fit_stroke(stroke, within, closed, **shape)
+        return designer.fit_stroke(stroke, within, closed, **shape, progress=progress)
 
 
 def new_through(opened: Opened, places: SurfacePoints, closed: bool) -> Opened:

@@ -82,12 +82,6 @@ class DesignRequest:
                 "again"
             )
 
-    def in_world(self, core_positions: np.ndarray) -> np.ndarray:
-        """World positions of points (n, 3) that are given in the space of the core."""
-        local = core_positions @ np.linalg.inv(self.surface.local_to_core).T
-        local_to_world = self.surface.local_to_world
-        return local @ local_to_world[:3, :3].T + local_to_world[:3, 3]
-
 
 def for_points(
     mesh_object: bpy.types.Object,

@@ -78,6 +78,11 @@ class Surface:
         """Positions in local space of points given by triangle and barycentric coordinates."""
         return np.einsum("nj,njk->nk", barycentric, self.local_positions[self.faces[faces]])
 
+    def in_world(self, core_positions: np.ndarray) -> np.ndarray:
+        """World positions of points (n, 3) that are given in the space of the core."""
+        local = core_positions @ np.linalg.inv(self.local_to_core).T
+        return local @ self.local_to_world[:3, :3].T + self.local_to_world[:3, 3]
+
     @cached_property
     def fingerprint(self) -> bytes:
         """A hash of the arrays that the core works on."""

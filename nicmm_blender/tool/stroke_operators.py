@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
 
 from ..operators.error_reports import called, with_error_reports
 from ..operators.partial_curve import PartialCurve
+from ..operators.sliced_operator import SlicedOperator
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import surface_cache
@@ -28,6 +30,9 @@ from .point_operators import POSITION
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfacePoints
+    from ...nicmm_core.progress import Progress
+
+    Search = Callable[[Progress | None], tuple[SurfacePoints, bool]]
 
 NEAR = 30.0
 """Distance from the mouse within which a feature is looked for, in pixels at a scale of 1."""
@@ -47,7 +52,56 @@ FEWEST = 2
 HINT = "Release: Create Curve   |   Esc, Right Mouse: Cancel"
 
 
-class NICMM_OT_stroke_curve(ChangesPoints, bpy.types.Operator):
+class _FollowsLine(ChangesPoints):
+    """A mixin for operators that find control points along a line, and then design the curve."""
+
+    if TYPE_CHECKING:  # Blender evaluates annotations of operators without loading the core
+        _search: Search | None
+    _search = None  # the search for control points, until it has ended
+
+    def search(self, opened: Opened) -> Search:
+        """The search for control points along the line, which tells whether this is closed."""
+        raise NotImplementedError
+
+    def with_found(self, opened: Opened, found: SurfacePoints, closed: bool) -> Opened:
+        """The curve through control points that have been found."""
+        return edited_curve.new_through(opened, found, closed)
+
+    def edited(self, opened: Opened) -> Opened:
+        return self.with_found(opened, *self.search(opened)(None))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if bpy.app.background:
+            return self.execute(context)
+        return with_error_reports(self, lambda: self._begin(context))
+
+    def _begin(self, context: bpy.types.Context) -> set[str]:
+        self._opened = self.open_curve(context)
+        self._search = self.search(self._opened)
+        return self.work_on(context, self._search)
+
+    def done(self, context: bpy.types.Context, result: Any) -> set[str]:
+        """Design the curve when its control points have been found."""
+        if self._search is None:
+            return super().done(context, result)
+        self._search = None
+        self._edited = self.with_found(self._opened, *result)
+        self.has_handler = self.is_sliced
+        return self.answer(context, edited_curve.request(self._edited, self._edited.points))
+
+    def show_progress(self, context: bpy.types.Context) -> None:
+        if self._search is None:
+            super().show_progress(context)
+            return
+        SlicedOperator.show_progress(self, context)
+        if self._partial is None:
+            self._partial = PartialCurve()
+        if len(self._work.polyline):
+            line = self._opened.surface.in_world(self._work.polyline)
+            self._partial.show(line, closed=False)
+
+
+class NICMM_OT_stroke_curve(_FollowsLine, bpy.types.Operator):
     """Create a curve with few control points that follows a stroke, or redraw a stretch of one"""
 
     bl_idname = "nicmm.stroke_curve"
@@ -90,20 +144,25 @@ class NICMM_OT_stroke_curve(ChangesPoints, bpy.types.Operator):
             raise InputError("Make a designed curve active to redraw a stretch of it")
         return _opened_for(context, chosen)
 
-    def edited(self, opened: Opened) -> Opened:
+    def search(self, opened: Opened) -> Search:
         check_finite("tolerance", self.tolerance)
         stroke = np.array([point.position[:] for point in self.points], dtype=float).reshape(-1, 3)
         if len(stroke) < FEWEST:
             raise InputError("The stroke has fewer than two points. Draw a longer one")
-        stroke = stroke @ opened.surface.local_to_core.T
-        closed = self.closed and not self.redraw
-        found = edited_curve.points_along(opened, stroke, self.tolerance, closed)
+        self._stroke = stroke = stroke @ opened.surface.local_to_core.T
+        tolerance, closed = self.tolerance, self.closed and not self.redraw
+        return lambda progress: (
+            edited_curve.points_along(opened, stroke, tolerance, closed, progress),
+            closed,
+        )
+
+    def with_found(self, opened: Opened, found: SurfacePoints, closed: bool) -> Opened:
         if self.redraw:
-            return _with_stretch(opened, found, stroke)
-        return edited_curve.new_through(opened, found, closed)
+            return _with_stretch(opened, found, self._stroke)
+        return super().with_found(opened, found, closed)
 
 
-class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
+class NICMM_OT_feature_curve(_FollowsLine, bpy.types.Operator):
     """Create the closed curve along the ridge, valley, sharp edge or boundary next to a point.
 
     If the feature has an end, the curve is open.
@@ -153,7 +212,7 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
             raise InputError("There is no alignment map. Choose one in the sidebar")
         return _opened_for(context, None)
 
-    def edited(self, opened: Opened) -> Opened:
+    def search(self, opened: Opened) -> Search:
         check_finite("reach", self.reach)
         surface = opened.surface
         place = self._place(opened)
@@ -161,9 +220,12 @@ class NICMM_OT_feature_curve(ChangesPoints, bpy.types.Operator):
         weights = None
         if self._map:
             weights = group_weights(opened.mesh_object, self._map, surface.with_modifiers)
-        with surface_cache.designer_of(surface) as designer:
-            found, closed = designer.feature_loop(place, weights=weights, reach=reach)
-        return edited_curve.new_through(opened, found, closed)
+
+        def found(progress: Progress | None) -> tuple[SurfacePoints, bool]:
+            with surface_cache.designer_of(surface) as designer:
+                return designer.feature_loop(place, None, weights, reach, progress)
+
+        return found
 
 
 def _opened_for(context: bpy.types.Context, curve: bpy.types.Object | None) -> Opened:
@@ -176,7 +238,7 @@ def _opened_for(context: bpy.types.Context, curve: bpy.types.Object | None) -> O
 def _with_stretch(opened: Opened, places: SurfacePoints, stroke: np.ndarray) -> Opened:
     """A curve with a stretch replaced by the points of a stroke."""
     from ...nicmm_core.geometry.surface_points import joined
-    from ...nicmm_core.stretch import stretch_between
+    from ...nicmm_core.strokes.stretch import stretch_between
 
     if opened.curve is None:
         raise InputError("The curve has to be designed first. Run Update Curves")

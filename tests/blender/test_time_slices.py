@@ -134,7 +134,7 @@ class Window:
     def finish(self):
         """Send timer events until the operator ends."""
         result = {"PASS_THROUGH"}
-        while result == {"PASS_THROUGH"}:
+        while result & {"PASS_THROUGH", "RUNNING_MODAL"}:
             result = self.send("TIMER")
         return result
 
@@ -317,3 +317,54 @@ def test_mesh_that_changes_meanwhile_is_reported(drawing):
     assert drawing.finish() == {"CANCELLED"}
     ((kind, message),) = drawing.reports
     assert kind == {"ERROR"} and "changed while the curve was being computed" in message
+
+
+@pytest.fixture
+def following(empty_scene, no_patience, monkeypatch):
+    """A window with an operator that fits points to a stroke on a sphere, then designs a curve."""
+    core = scenes.installed_core().__name__
+    monkeypatch.setattr(import_module(f"{core}.progress"), "INTERVAL", 0.0)
+    operators = scenes.module(empty_scene, "tool.stroke_operators")
+    edited_curve = scenes.module(empty_scene, "outputs.edited_curve")
+    scenes.sphere(4)
+    opened = edited_curve.open_new(bpy.context)
+    angle = np.linspace(0.0, 2.0, 100)
+    stroke = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)], axis=1)
+    stroke /= np.linalg.norm(stroke, axis=1, keepdims=True)
+    stroke = stroke @ opened.surface.local_to_core.T
+
+    class Following(operators._FollowsLine):
+        def open_curve(self, _context):
+            return opened
+
+        def search(self, opened):
+            return lambda progress: (
+                edited_curve.points_along(opened, stroke, 0.05, False, progress),
+                False,
+            )
+
+        def finish(self, _context, _requests, answers):
+            (answer,) = answers
+            self.report({"INFO"}, f"{len(self._edited.points)} {answer.curves[0].length:.9f}")
+            return {"FINISHED"}
+
+    return Window(Following)
+
+
+def test_a_stroke_is_fitted_in_time_slices(following, empty_scene):
+    assert following.operator._begin(following.context) == {"RUNNING_MODAL"}
+    assert following.finish() == {"FINISHED"}
+    assert following.handlers == [following.operator] and not following.timers
+    preferences(empty_scene).patience = 10.0
+    assert following.operator._begin(following.context) == {"FINISHED"}
+    assert following.reports[0] == following.reports[1]
+    assert int(following.reports[0][1].split()[0]) < 10
+
+
+def test_escape_stops_the_fit_of_a_stroke(following):
+    before = threading.active_count()
+    following.operator._begin(following.context)
+    following.send("TIMER")
+    assert following.send("ESC", "PRESS") == {"CANCELLED"}
+    assert threading.active_count() == before
+    assert not following.timers and not vars(following.operator)

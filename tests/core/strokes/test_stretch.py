@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.stretch import stretch_between
+from nicmm_core.strokes.stretch import stretch_between
 
 ANGLES = 2.0 * np.pi * np.arange(6) / 6.0
 

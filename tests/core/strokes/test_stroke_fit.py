@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
+from nicmm_core import progress, shapes
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points
 from tests.core.checks import random_surface_points
@@ -131,3 +131,27 @@ def test_a_stroke_from_one_part_to_another_is_refused():
     line[:, 2] = np.sqrt(np.maximum(1.0 - np.minimum(line[:, 0] ** 2, (line[:, 0] - 2.2) ** 2), 0))
     with pytest.raises(nicmm.UnreachableError, match="no curve was found"):
         nicmm.fit_stroke(mesh, line, 0.15)
+
+
+def test_a_fit_can_be_cancelled_and_shows_its_curve(body, monkeypatch):
+    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    points = random_surface_points(body, 4, 1)
+    curve = nicmm.design_curve(body, points, closed=True, order="shortest").curves[0]
+    stroke = stroke_of(curve, 0.01 * body.diagonal)
+    fractions, lines = [], []
+
+    def watch(fraction, line):
+        fractions.append(fraction)
+        lines.append(line)
+        return len(fractions) < 40
+
+    found = nicmm.fit_stroke(body, stroke, 0.02 * body.diagonal, closed=True, progress=watch)
+    assert len(fractions) == 40 and found.shape == (0, 3)
+    assert fractions == sorted(fractions)
+    assert any(map(len, lines))
+
+
+def test_the_progress_of_a_fit_must_be_callable(ball):
+    stroke = np.eye(3)
+    with pytest.raises(nicmm.ArgumentError, match="progress"):
+        nicmm.fit_stroke(ball, stroke, 0.1, progress=1)

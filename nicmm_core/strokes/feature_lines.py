@@ -19,16 +19,16 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from .arguments import checked_map, checked_number
-from .errors import ArgumentError, ControlPointError, UnreachableError
-from .geometry.array_types import BoolArray, FloatArray, IntArray
-from .geometry.curve import resample
-from .geometry.mesh import Mesh, edge_lengths, unique_edges
-from .geometry.surface_points import SurfacePoints, locate_points, nearest_points
-from .geometry.tolerances import TINY
-from .maps.feature_maps import edge_map, principal_curvatures, sharp_edges
-from .progress import checkpoint
-from .repair.clean_surface import joined_surface
+from ..arguments import checked_map, checked_number
+from ..errors import ArgumentError, ControlPointError, UnreachableError
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.curve import resample
+from ..geometry.mesh import Mesh, edge_lengths, unique_edges
+from ..geometry.surface_points import SurfacePoints, locate_points, nearest_points
+from ..geometry.tolerances import TINY
+from ..maps.feature_maps import edge_map, principal_curvatures, sharp_edges
+from ..progress import checkpoint
+from ..repair.clean_surface import joined_surface
 
 REACH = 4.0
 """Least distance from the point within which a feature is looked for, in mean edge lengths

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, leg_lengths
-from .geometry.curve_places import CurvePlace, nearest_place
-from .geometry.mesh import Mesh
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve, leg_lengths
+from ..geometry.curve_places import CurvePlace, nearest_place
+from ..geometry.mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ The stroke is smoothed by a spline, and control points are places on it:
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -21,17 +22,17 @@ import numpy as np
 from scipy.interpolate import splev, splprep
 from scipy.spatial import cKDTree
 
-from .arguments import checked_number
-from .errors import ArgumentError, ControlPointError, CurveError, UnreachableError
-from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, arc_lengths
-from .geometry.mesh import Mesh, real_array
-from .geometry.surface_points import SurfacePoints, nearest_points, snapped
-from .geometry.tolerances import COINCIDENT
-from .options import FEWEST_CLOSED, FEWEST_OPEN
-from .path.spline_path import interpolating_spline
-from .progress import checkpoint
-from .repair.surface_normals import surface_normals
+from ..arguments import checked_number
+from ..errors import ArgumentError, ControlPointError, CurveError, UnreachableError
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve, arc_lengths
+from ..geometry.mesh import Mesh, real_array
+from ..geometry.surface_points import SurfacePoints, nearest_points, snapped
+from ..geometry.tolerances import COINCIDENT
+from ..options import FEWEST_CLOSED, FEWEST_OPEN
+from ..path.spline_path import interpolating_spline
+from ..progress import checkpoint
+from ..repair.surface_normals import surface_normals
 
 SMOOTHING = 0.35
 """Root mean square distance of the smoothed stroke from the stroke, in tolerances. Noise of about
@@ -73,15 +74,16 @@ APART = 3
 """Least number of places between two control points."""
 
 
-class Along(NamedTuple):
+class Line(NamedTuple):
     """A line near the surface, (n, 3), and which of its points are control points, (k,)."""
 
-    line: FloatArray
+    positions: FloatArray
     control_index: IntArray
 
 
-Curves = Callable[[SurfacePoints, Along | None], SurfaceCurve]
-"""Designs the curve through control points, or relaxes it from a line."""
+Curves = Callable[[SurfacePoints, Line | None], SurfaceCurve | None]
+"""Designs the curve through control points, or relaxes it from a line if there is a curve along it.
+"""
 
 
 def checked_stroke(
@@ -140,7 +142,7 @@ def fitted_points(
         In mesh units.
     closed : bool
     design : callable
-        Designs the curve through control points, or relaxes it from a line.
+        Designs the curve through control points, or relaxes it from a line; see `Curves`.
 
     Raises
     ------
@@ -208,16 +210,14 @@ class _Fit:
             checkpoint()
             if len(knots) > most:
                 return None
-            try:
-                line = Along(self.places, knots) if along else None
+            curve = None
+            # Two of the points may coincide, or lie on different parts.
+            with contextlib.suppress(ControlPointError, UnreachableError, CurveError):
+                line = Line(self.places, knots) if along else None
                 curve = self.design(self.points(knots), line)
-            except (ControlPointError, UnreachableError, CurveError):
-                # Two of the points may coincide, or lie on different parts.
-                missing = np.arange(0)
-            else:
-                missing = self.missing(knots, curve)
-                if not len(missing):
-                    return knots
+            missing = np.arange(0) if curve is None else self.missing(knots, curve)
+            if curve is not None and not len(missing):
+                return knots
             finer = knots
             for place in missing:
                 finer = _with_knot(finer, len(self.places), self.closed, int(place))
