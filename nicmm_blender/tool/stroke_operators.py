@@ -55,9 +55,8 @@ HINT = "Release: Create Curve   |   Esc, Right Mouse: Cancel"
 class _FollowsLine(ChangesPoints):
     """A mixin for operators that find control points along a line, and then design the curve."""
 
-    if TYPE_CHECKING:  # Blender evaluates annotations of operators without loading the core
-        _search: Search | None
-    _search = None  # the search for control points, until it has ended
+    _search: Any = None
+    """The search for control points, until it has ended."""
 
     def search(self, opened: Opened) -> Search:
         """The search for control points along the line, which tells whether this is closed."""
