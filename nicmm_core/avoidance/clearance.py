@@ -18,7 +18,7 @@ from ..geometry.segment_distances import FaceSegments, SegmentDistances
 from ..geometry.surface_points import SurfacePoints
 from ..repair.divided_faces import positive_parts
 from ..repair.face_parts import FaceParts
-from ..repair.level_refinement import distances_up_to, refined_surface
+from ..repair.level_refinement import distances_up_to, least_coarsest, refined_surface
 from ..repair.mapped_mesh import MappedMesh
 from ..repair.removed_faces import points_at
 from .avoided_curve import FADE, Avoided
@@ -94,7 +94,19 @@ def _on_mesh(mapped: MappedMesh, segments: FaceSegments) -> FaceSegments:
 
 
 def distances_near(mesh: Mesh, segments: FaceSegments, clearance: float) -> SegmentDistances:
-    """Distances from the segments as far as they are needed."""
+    """Distances from the segments as far as they are needed.
+
+    Raises
+    ------
+    ArgumentError
+        If the clearance is too small beside the length of the segments, or reaches too far.
+    """
+    least = least_coarsest(mesh, segments) / COARSEST
+    if clearance < least:
+        raise ArgumentError(
+            f"clearance is {clearance:g}, too small beside the lengths of the curves to avoid; "
+            f"pass 0, or at least {least:.2g}"
+        )
     try:
         return distances_up_to(mesh, segments, LEVEL * clearance, COARSEST * clearance)
     except nicmm_kernels.TooManyWindowsError as error:

@@ -32,6 +32,7 @@ from ..repair.level_refinement import (
     RefinedSurface,
     distances_up_to,
     faces_near,
+    least_coarsest,
     refined_surface,
 )
 from ..repair.mapped_mesh import MappedMesh
@@ -147,13 +148,14 @@ def offset_curves(
     if not distances:
         return []
     magnitudes = np.concatenate([np.abs(each) for each in distances])
-    if magnitudes.min() <= SAME_POSITION * mapped.mesh.diagonal:
-        raise ArgumentError(
-            f"distance is {magnitudes.min():g}, too small for the coordinates of this mesh; pass a "
-            "greater one"
-        )
-    farthest = float(magnitudes.max())
+    farthest, nearest = float(magnitudes.max()), float(magnitudes.min())
     band = _band(mapped.mesh, curve, farthest)
+    least = least_coarsest(band.mesh, band.segments) / COARSEST
+    if nearest < least:
+        raise ArgumentError(
+            f"distance is {nearest:g}, too small beside the length of the curve; pass at least "
+            f"{least:.2g}"
+        )
     try:
         found = distances_up_to(band.mesh, band.segments, farthest, COARSEST * farthest)
     except nicmm_kernels.TooManyWindowsError as error:

@@ -24,6 +24,10 @@ REACH = 1.25
 """Distance beyond the line up to which distances are computed, in lengths of the longest edge of
 the faces there, if that is not longer than allowed."""
 
+MOST_PIECES = 20_000
+"""Greatest length of the segments, relative to the longest edges that are allowed at the line. The
+faces along them would be divided into some ten times as many parts."""
+
 
 @dataclass(frozen=True)
 class RefinedSurface:
@@ -62,6 +66,18 @@ def distances_up_to(
     """
     _, longest = faces_near(mesh, segments, distance)
     return SegmentDistances(mesh, segments, distance + REACH * min(longest, coarsest))
+
+
+def least_coarsest(mesh: Mesh, segments: FaceSegments) -> float:
+    """Least value of `coarsest` for a line near segments; a smaller one would need too many parts.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    segments : FaceSegments
+    """
+    start, end = segments.positions(mesh)
+    return float(np.linalg.norm(end - start, axis=1).sum()) / MOST_PIECES
 
 
 def faces_near(mesh: Mesh, segments: FaceSegments, distance: float) -> tuple[IntArray, float]:
