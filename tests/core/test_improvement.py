@@ -5,8 +5,11 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import improvement, start_search
+from nicmm_core.geometry.curve import resample
+from nicmm_core.geometry.surface_points import nearest_points, snapped
 from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
+from tests.core.checks import random_surface_points
 from tests.oracles.energies import named_requests
 
 REQUESTS = {request.name: request for request in named_requests()}
@@ -68,3 +71,30 @@ def test_relative_energies_are_at_least_one_with_maps(ball):
     design = nicmm.design_curve(ball, [3, 200, 400, 611], alternatives=4, alignment=lane)
     relative = [each.relative_energy for each in (design, *design.alternatives)]
     assert len(relative) > 1 and relative[0] == 1.0 and relative == sorted(relative)
+
+
+@pytest.mark.parametrize("count", [8, 16])
+@pytest.mark.parametrize("closed", [False, True])
+def test_many_points_of_a_fair_curve_have_a_curve_as_fair(surface, closed, count):
+    """The curve from which they are taken passes through them."""
+    points = random_surface_points(surface, 4, 3)
+    designer = nicmm.Designer(surface)
+    known = designer.design(points, closed=closed, order="shortest")
+    places, _ = resample(known.curves[0].points, count, closed)
+    controls, _ = nearest_points(surface, places)
+    found = designer.design(snapped(controls), closed=closed)
+    assert found.energy["smooth"] <= 1.03 * known.energy["smooth"]
+
+
+def test_the_spline_through_many_points_is_tried(ball, monkeypatch):
+    tried = []
+    by_spline = start_search.StartSearch.by_spline
+
+    def spy(search, request, visited):
+        tried.append(len(visited))
+        return by_spline(search, request, visited)
+
+    monkeypatch.setattr(start_search.StartSearch, "by_spline", spy)
+    for count in (4, improvement.FEWEST_FOR_SPLINE):
+        nicmm.design_curve(ball, random_surface_points(ball, count, 1), order="shortest")
+    assert tried == [improvement.FEWEST_FOR_SPLINE]
