@@ -64,8 +64,9 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-SEARCHES_FOR_PARTS = 8
-"""Greatest number of searches for parts of the best curve."""
+SEARCHES_FOR_PARTS, OF_MANY_POINTS = 8, 2
+"""Greatest number of searches for parts of the best curve; and the same through so many control
+points that the spline is tried, where further ones gained nothing."""
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
 """Greatest numbers of courses looked at after each of them, and of those relaxed."""
@@ -162,7 +163,7 @@ class Improvement:
         """
         request = self.request
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
-        if len(request.points) >= FEWEST_FOR_SPLINE and not request.via_points:
+        if self._has_many_points:
             self._try_spline()
         if by_course:
             self._try_other_courses(courses)
@@ -235,7 +236,7 @@ class Improvement:
         """Try the best curve with other courses in the parts that bend most."""
         changed = self.best
         parts = bent_parts(self.curves[changed])
-        for _ in range(SEARCHES_FOR_PARTS):
+        for _ in range(OF_MANY_POINTS if self._has_many_points else SEARCHES_FOR_PARTS):
             part = next(parts, None)
             if part is None or not self._should_try_another_part():
                 break
@@ -353,6 +354,11 @@ class Improvement:
         unpainted = replace(self._surface, feature_map=None)
         scale = self.curves[0].length
         return float(energies_of(unpainted, [curve], self.request.smoothness, scale)[0])
+
+    @property
+    def _has_many_points(self) -> bool:
+        """Whether control points alone, without via points, determine most of the course."""
+        return len(self.request.points) >= FEWEST_FOR_SPLINE and not self.request.via_points
 
     @property
     def _is_kinked(self) -> bool:

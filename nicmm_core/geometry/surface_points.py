@@ -82,7 +82,8 @@ def locate_control_points(
     Returns
     -------
     SurfacePoints
-        The points, with coordinates below `tolerances.SNAP` set to exactly zero.
+        The points, with coordinates below `tolerances.SNAP` set to exactly zero, and all rounded to
+        multiples of `tolerances.BARYCENTRIC_UNIT`.
 
     Raises
     ------
@@ -123,7 +124,8 @@ def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> Su
     Returns
     -------
     SurfacePoints
-        The points, with coordinates below `tolerances.SNAP` set to exactly zero.
+        The points, with coordinates below `tolerances.SNAP` set to exactly zero, and all rounded to
+        multiples of `tolerances.BARYCENTRIC_UNIT`.
 
     Raises
     ------
@@ -328,9 +330,14 @@ def check_count(count: int, closed: bool, kind_of_points: str = "") -> None:
 
 
 def snapped(points: SurfacePoints) -> SurfacePoints:
-    """The points, with coordinates below `tolerances.SNAP` set to exactly zero."""
+    """The points, with coordinates below `tolerances.SNAP` set to exactly zero, and all rounded."""
     barycentric = np.where(points.barycentric < tolerances.SNAP, 0.0, points.barycentric)
-    return SurfacePoints(points.faces, barycentric / barycentric.sum(axis=1, keepdims=True))
+    barycentric /= barycentric.sum(axis=1, keepdims=True)
+    unit = tolerances.BARYCENTRIC_UNIT
+    barycentric = np.rint(barycentric / unit) * unit
+    row, greatest = np.arange(len(barycentric)), barycentric.argmax(axis=1)
+    barycentric[row, greatest] += 1.0 - barycentric.sum(axis=1)  # exact, so the sum is exactly 1
+    return SurfacePoints(points.faces, barycentric)
 
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:

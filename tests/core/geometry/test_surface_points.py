@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.geometry.surface_points import first_hits, locate_control_points, nearest_points
+from nicmm_core.geometry.surface_points import (
+    first_hits,
+    locate_control_points,
+    locate_points,
+    nearest_points,
+)
 from tests.core.checks import joined, random_surface_points
 
 SurfacePoints = nicmm.SurfacePoints
@@ -167,3 +172,19 @@ def test_first_hits_of_rays(ball):
     np.testing.assert_allclose(hit.positions(ball), met, atol=1e-6)
     assert (hit.barycentric >= 0.0).all()
     np.testing.assert_allclose(hit.barycentric.sum(axis=1), 1.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("away", [0.0, 1.0, 100.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_points_are_the_same_by_position_and_by_coordinates(body, size, away):
+    """Also far from the origin, where positions have greater rounding errors."""
+    mesh = nicmm.Mesh(size * (body.vertices + away), body.faces)
+    generator = np.random.default_rng(1)
+    faces = generator.integers(len(mesh.faces), size=200)
+    given = SurfacePoints(faces, generator.dirichlet(np.ones(3), 200))
+    points = locate_points(mesh, given, "points")
+    np.testing.assert_allclose(points.barycentric, given.barycentric, atol=2e-11)
+    again = locate_points(mesh, points.positions(mesh), "points")
+    np.testing.assert_array_equal(again.faces, points.faces)
+    np.testing.assert_array_equal(again.barycentric, points.barycentric)
+    assert (points.barycentric.sum(axis=1) == 1.0).all()
