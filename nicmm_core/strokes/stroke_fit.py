@@ -165,11 +165,11 @@ def fitted_points(
         normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
         guess = _fewest_knots(places, normals, tolerance, closed)
         most = max(MOST_POINTS, 2 * len(guess))
-        found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, True)
+        found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
         if found is not None:
-            found = fit.refined(found, most, MOST_DESIGNED, False)
+            found = fit.refined(found, most, MOST_DESIGNED, along=False)
         if found is None:
-            found = fit.refined(guess, most, MOST_DESIGNED, False)
+            found = fit.refined(guess, most, MOST_DESIGNED, along=False)
         if found is not None:
             return fit.points(found)
     raise UnreachableError(
@@ -193,7 +193,7 @@ class _Fit:
         """The points of the surface at knots, which are indices of places."""
         return snapped(nearest_points(self.mesh, self.places[knots])[0])
 
-    def refined(self, knots: IntArray, most: int, rounds: int, along: bool) -> IntArray | None:
+    def refined(self, knots: IntArray, most: int, rounds: int, *, along: bool) -> IntArray | None:
         """Knots, with others added until their curve stays near the stroke; None if that fails.
 
         Parameters
