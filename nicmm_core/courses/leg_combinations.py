@@ -55,8 +55,10 @@ BEAM_WIDTH = 3_000
 """Number of incomplete combinations kept after each leg."""
 
 
-MAX_RELATIVE_COST = 2.5
-"""Cost of a combination, relative to the cheapest, above which it is not relaxed."""
+MAX_RELATIVE_COST, OF_MANY_LEGS, MANY_LEGS = 1.5, 2.5, 5
+"""Cost of a combination, relative to the cheapest, above which it is not relaxed; its value for
+many legs, and the number from which they are many. Short legs have few cells, so that costs are
+less accurate."""
 
 
 @dataclass(frozen=True)
@@ -285,7 +287,8 @@ def distinct_combinations(
     """
     offset = np.cumsum([0] + [len(pairs) for pairs in alike])[:-1]
     choice = combinations.choice - offset
-    left = combinations.cost <= MAX_RELATIVE_COST * combinations.cost.min(initial=np.inf)
+    limit = OF_MANY_LEGS if len(alike) >= MANY_LEGS else MAX_RELATIVE_COST
+    left = combinations.cost <= limit * combinations.cost.min(initial=np.inf)
     chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())

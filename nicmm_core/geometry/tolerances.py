@@ -13,8 +13,8 @@ ON_SURFACE = 1e-4
 SNAP = 1e-6
 """Barycentric coordinates below this value count as zero: the point is on an edge or a vertex."""
 
-BARYCENTRIC_UNIT = 2.0**-36
-"""Barycentric coordinates of given points are multiples of it, about 1e-11. So a point is the same
+BARYCENTRIC_UNIT = 2.0**-40
+"""Barycentric coordinates of given points are multiples of it, about 1e-12. So a point is the same
 whether it is given by its coordinates or by its position, which has rounding errors."""
 
 COINCIDENT = 1e-9

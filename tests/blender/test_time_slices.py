@@ -134,7 +134,7 @@ class Window:
     def finish(self):
         """Send timer events until the operator ends."""
         result = {"PASS_THROUGH"}
-        while result & {"PASS_THROUGH", "RUNNING_MODAL"}:
+        while result == {"PASS_THROUGH"}:
             result = self.send("TIMER")
         return result
 
@@ -353,6 +353,7 @@ def following(empty_scene, no_patience, monkeypatch):
 
 def test_a_stroke_is_fitted_in_time_slices(following, empty_scene):
     assert following.operator._begin(following.context) == {"RUNNING_MODAL"}
+    assert following.finish() == {"RUNNING_MODAL"}  # now the curve
     assert following.finish() == {"FINISHED"}
     assert following.handlers == [following.operator] and not following.timers
     preferences(empty_scene).patience = 10.0

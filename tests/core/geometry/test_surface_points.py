@@ -174,7 +174,7 @@ def test_first_hits_of_rays(ball):
     np.testing.assert_allclose(hit.barycentric.sum(axis=1), 1.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("away", [0.0, 1.0, 100.0])
+@pytest.mark.parametrize("away", [0.0, 1.0, 5.0])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_points_are_the_same_by_position_and_by_coordinates(body, size, away):
     """Also far from the origin, where positions have greater rounding errors."""
@@ -183,7 +183,7 @@ def test_points_are_the_same_by_position_and_by_coordinates(body, size, away):
     faces = generator.integers(len(mesh.faces), size=200)
     given = SurfacePoints(faces, generator.dirichlet(np.ones(3), 200))
     points = locate_points(mesh, given, "points")
-    np.testing.assert_allclose(points.barycentric, given.barycentric, atol=2e-11)
+    np.testing.assert_allclose(points.barycentric, given.barycentric, atol=1e-12)
     again = locate_points(mesh, points.positions(mesh), "points")
     np.testing.assert_array_equal(again.faces, points.faces)
     np.testing.assert_array_equal(again.barycentric, points.barycentric)
