@@ -266,9 +266,9 @@ def section(results: Results) -> str:
         f"({refused}), and others are drawn. Then a point of the first curve is moved, and the "
         f"others are designed again: {kept} of {again} keep their courses, "
         f"the others take another one. {blocked} moves close the way of another curve; they are "
-        "refused, and other places are drawn. `tests/oracles/separation.py` cuts the mesh along the avoided curves and "
-        "bounds distances from them by exact geodesics: it proves that no curve exists for "
-        f"{len(refusals) - unproven} of all {len(refusals)} refusals.\n\n"
+        "refused, and other places are drawn. `tests/oracles/separation.py` cuts the mesh along "
+        "the avoided curves and bounds distances from them by exact geodesics: it proves that no "
+        f"curve exists for {len(refusals) - unproven} of all {len(refusals)} refusals.\n\n"
         + report.table(header, rows)
         + "\n\nThe paper has no corresponding measurement."
     )

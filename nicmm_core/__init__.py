@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     from .errors import UnreachableError as UnreachableError
     from .geometry.curve import SurfaceCurve as SurfaceCurve
     from .geometry.mesh import Mesh as Mesh
+    from .geometry.mesh import MeshLike as MeshLike
+    from .geometry.mesh import as_mesh as as_mesh
     from .geometry.surface_points import SurfacePoints as SurfacePoints
+    from .io.adapters import from_meshio as from_meshio
+    from .io.adapters import from_open3d as from_open3d
     from .io.files import read_curve as read_curve
     from .io.files import read_mesh as read_mesh
     from .io.files import write_curve as write_curve
@@ -42,6 +46,7 @@ if TYPE_CHECKING:
     from .outputs.parts import part_mesh as part_mesh
     from .outputs.region import Region as Region
     from .outputs.region import enclosed_region as enclosed_region
+    from .plotting import plot as plot
     from .status import Status as Status
 
 _NAMES = {
@@ -64,8 +69,16 @@ _NAMES = {
         "UnreachableError",
     ),
     "geometry.curve": ("SurfaceCurve",),
-    "geometry.mesh": ("Mesh",),
+    "geometry.mesh": (
+        "Mesh",
+        "MeshLike",
+        "as_mesh",
+    ),
     "geometry.surface_points": ("SurfacePoints",),
+    "io.adapters": (
+        "from_meshio",
+        "from_open3d",
+    ),
     "io.files": (
         "read_curve",
         "read_mesh",
@@ -92,6 +105,7 @@ _NAMES = {
         "Region",
         "enclosed_region",
     ),
+    "plotting": ("plot",),
     "status": ("Status",),
 }
 """The public names of the package, by the module that defines them."""

@@ -44,7 +44,7 @@ from .design_result import Design, cancelled_design, with_curves_of_designs
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of
-from .geometry.mesh import Mesh
+from .geometry.mesh import Mesh, MeshLike, as_mesh
 from .geometry.mirror import Plane, checked_plane
 from .geometry.surface_points import (
     SurfacePoints,
@@ -116,15 +116,11 @@ class Designer:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        if not isinstance(mesh, Mesh):
-            raise ArgumentError(
-                f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
-            )
-        self.mesh = mesh
+    def __init__(self, mesh: MeshLike) -> None:
+        self.mesh = as_mesh(mesh)
         self._free: _Free | None = None  # of the last request with obstacles
         self._off_curves: SurfaceOffCurves | None = None  # of the last one with curves to avoid
         self._reflected: ReflectedVertices | None = None  # of the last one with maps and a mirror
@@ -599,7 +595,7 @@ def _check_start(start: object, method: str, max_iterations: int | None, alterna
 
 
 def design_curve(
-    mesh: Mesh,
+    mesh: MeshLike,
     control_points: ArrayLike | SurfacePoints,
     *,
     closed: bool = True,
@@ -621,7 +617,7 @@ def design_curve(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
     control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
         Vertex indices, points on the surface, or faces with barycentric coordinates; at least
         three for a closed curve and two for an open one.
@@ -724,7 +720,7 @@ def design_curve(
     )
 
 
-def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
+def mirrored(mesh: MeshLike, design: Design, plane: ArrayLike) -> Design:
     """The mirror image of a design, as a design on the same mesh.
 
     Every point of the curve is moved to the place of the mesh nearest to its mirror image, and
@@ -733,7 +729,7 @@ def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
         The mesh of the design.
     design : Design
         A design with one curve.
@@ -768,7 +764,7 @@ def mirrored(mesh: Mesh, design: Design, plane: ArrayLike) -> Design:
 
 
 def offset_curve(
-    mesh: Mesh, curve: SurfaceCurve | Design, distance: ArrayLike
+    mesh: MeshLike, curve: SurfaceCurve | Design, distance: ArrayLike
 ) -> list[SurfaceCurve]:
     """Curves at a distance from a curve along the surface, on one side of it.
 
@@ -778,7 +774,7 @@ def offset_curve(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
     curve : SurfaceCurve or Design
         A curve on this mesh, or a design with one.
     distance : float or (k,) float array_like
@@ -816,7 +812,7 @@ def offset_curve(
 
 
 def fit_stroke(
-    mesh: Mesh,
+    mesh: MeshLike,
     points: ArrayLike,
     tolerance: float,
     *,
@@ -827,7 +823,7 @@ def fit_stroke(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
     points : (n, 3) float array_like
         The stroke, in order: positions near the surface, possibly noisy.
     tolerance : float
@@ -864,12 +860,13 @@ def fit_stroke(
     >>> len(nicmm.fit_stroke(mesh, stroke, tolerance=0.05)) < 6
     True
     """
-    found = Designer(mesh).fit_stroke(points, tolerance, closed, progress=progress)
-    return found.positions(mesh)
+    designer = Designer(mesh)
+    found = designer.fit_stroke(points, tolerance, closed, progress=progress)
+    return found.positions(designer.mesh)
 
 
 def feature_loop(
-    mesh: Mesh,
+    mesh: MeshLike,
     point: ArrayLike | SurfacePoints,
     *,
     edges: ArrayLike | None = None,
@@ -885,7 +882,7 @@ def feature_loop(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or object with `vertices` and `faces`
     point : (1,) int array_like, (1, 3) float array_like or SurfacePoints
         A point on the surface near the feature; a vertex index or a position may be given alone.
     edges : (n, 2) int array_like, optional
@@ -922,5 +919,6 @@ def feature_loop(
     >>> design.curves[0].closed
     True
     """
-    found, _ = Designer(mesh).feature_loop(point, edges, weights, reach, progress)
-    return found.positions(mesh)
+    designer = Designer(mesh)
+    found, _ = designer.feature_loop(point, edges, weights, reach, progress)
+    return found.positions(designer.mesh)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, real_array, whole_numbers
+from .mesh import Mesh, MeshLike, real_array, whole_numbers
 from .surface_points import SurfacePoints, nearest_points, weights_at
 from .tolerances import BARYCENTRIC_SUM, GAP, ROUNDED, rounding
 
@@ -67,7 +67,7 @@ class SurfaceCurve:
 
     def measures(
         self,
-        mesh: Mesh,
+        mesh: MeshLike,
         obstacles: ArrayLike | None = None,
         up: ArrayLike = (0.0, 0.0, 1.0),
         corners: ArrayLike | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any, Protocol, TypeAlias
 
 import igl
 import nicmm_kernels
@@ -205,6 +206,48 @@ class Mesh:
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces] = True
         return used
+
+
+class VerticesAndFaces(Protocol):
+    """A mesh of another library, such as a `trimesh.Trimesh`."""
+
+    @property
+    def vertices(self) -> Any:
+        """Positions, (V, 3)."""
+
+    @property
+    def faces(self) -> Any:
+        """Corner indices of each triangle, (F, 3)."""
+
+
+MeshLike: TypeAlias = Mesh | VerticesAndFaces
+"""What functions accept as a mesh: a `Mesh`, or any object with `vertices` and `faces`."""
+
+
+def as_mesh(mesh: MeshLike) -> Mesh:
+    """The mesh itself, or a checked copy of another library's mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh or object with `vertices` and `faces`
+
+    Raises
+    ------
+    ArgumentError
+        If the object has no such attributes.
+    MeshError
+        If its arrays are not those of a triangle mesh.
+    """
+    if isinstance(mesh, Mesh):
+        return mesh
+    try:
+        vertices, faces = mesh.vertices, mesh.faces
+    except AttributeError:
+        raise ArgumentError(
+            f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces), an "
+            "object with vertices and faces, or the result of from_open3d or from_meshio"
+        ) from None
+    return Mesh(vertices, faces)
 
 
 def face_tree(vertices: FloatArray, faces: IntArray) -> igl.AABB:

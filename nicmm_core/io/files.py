@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ArgumentError, MeshError, NicmmError
 from ..geometry.curve import SurfaceCurve
-from ..geometry.mesh import Mesh, real_array, whole_numbers
+from ..geometry.mesh import Mesh, MeshLike, as_mesh, real_array, whole_numbers
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
@@ -84,7 +84,7 @@ def read_curve(path: str | Path) -> SurfaceCurve:
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
-def write_mesh(path: str | Path, mesh: Mesh) -> None:
+def write_mesh(path: str | Path, mesh: MeshLike) -> None:
     """Write a mesh as OBJ, OFF, PLY or STL, by the extension of the path.
 
     Raises
@@ -92,6 +92,7 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
     ArgumentError
         If the extension is not supported, or the file cannot be written.
     """
+    mesh = as_mesh(mesh)
     path = _checked_output(path, MESH_FORMATS)
     _write(path, _WRITERS[path.suffix.lower()](mesh.vertices, mesh.faces))
 

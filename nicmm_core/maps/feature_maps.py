@@ -16,7 +16,16 @@ from ..arguments import checked_number, checked_vertex_values, number_between
 from ..errors import ArgumentError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.mesh import Mesh, adjacent_sides, check_indices, edge_keys, side_keys, unique_edges
+from ..geometry.mesh import (
+    Mesh,
+    MeshLike,
+    adjacent_sides,
+    as_mesh,
+    check_indices,
+    edge_keys,
+    side_keys,
+    unique_edges,
+)
 from ..geometry.normals import unsigned_normals
 from ..repair.clean_surface import joined_surface
 
@@ -27,7 +36,7 @@ USUAL, STRIKING = 0.5, 0.95
 """Quantiles of the curvature over the area that get weight 0 and weight 1 by default."""
 
 
-def principal_curvatures(mesh: Mesh) -> FloatArray:
+def principal_curvatures(mesh: MeshLike) -> FloatArray:
     """Principal curvatures at the vertices, shape (V, 2), in 1/length, the larger one first.
 
     At each vertex a quadric is fitted to the heights of the two-ring over the tangent plane, with
@@ -39,6 +48,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     mesh : Mesh
         Any mesh; it may be open, unoriented, non-manifold or a soup of triangles.
     """
+    mesh = as_mesh(mesh)
     # Not `igl.principal_curvature`, which fails on small meshes and needs an orientation.
     surface = joined_surface(mesh)
     return _principal_curvatures(surface.mesh)[surface.place]
@@ -74,7 +84,9 @@ def _principal_curvatures(mesh: Mesh) -> FloatArray:
     return np.stack([mean + spread, mean - spread], axis=1)
 
 
-def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = None) -> FloatArray:
+def curvature_map(
+    mesh: MeshLike, low: float | None = None, high: float | None = None
+) -> FloatArray:
     """Weights for strongly curved parts of the surface: ridges, grooves and sharp edges.
 
     Between two limits, the weight is linear in the larger absolute principal curvature.
@@ -101,6 +113,7 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     Section 3.3 of the paper, after Xu et al., "A variational approach for feature-aware B-spline
     curve design on surface meshes", 2023.
     """
+    mesh = as_mesh(mesh)
     curvature = np.abs(principal_curvatures(mesh)).max(axis=1)
     if low is None or high is None:
         usual, striking = _quantiles_by_area(mesh, curvature, [USUAL, STRIKING])
@@ -112,7 +125,7 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     return value_map(mesh, curvature, low, high)
 
 
-def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
+def sharp_edges(mesh: MeshLike, angle: float = SHARP_ANGLE) -> IntArray:
     """Edges where the surface has a crease.
 
     Parameters
@@ -133,6 +146,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     ArgumentError
         If the angle is not in 0 … π.
     """
+    mesh = as_mesh(mesh)
     limit = number_between("angle", angle, 0.0, math.pi, "an angle in radians")
     surface = joined_surface(mesh)
     solid = np.flatnonzero(surface.mesh.face_areas > 0.0)
@@ -152,12 +166,13 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     return np.unique(np.sort(ends, axis=1), axis=0)
 
 
-def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
+def sharp_edge_map(mesh: MeshLike, angle: float = SHARP_ANGLE) -> FloatArray:
     """Weights of 1 at the ends of sharp edges and 0 elsewhere, shape (V,); see `sharp_edges`.
 
     A map has weights at vertices only. If all corners of a face lie on sharp edges, as on a box of
     twelve triangles, the whole face has weight 1; subdivide such a mesh.
     """
+    mesh = as_mesh(mesh)
     weights = edge_map(mesh, sharp_edges(mesh, angle))
     place = joined_surface(mesh).place
     at_place = np.zeros(len(weights))
@@ -165,7 +180,7 @@ def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
     return at_place[place]
 
 
-def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
+def edge_map(mesh: MeshLike, edges: ArrayLike) -> FloatArray:
     """Weights of 1 at the ends of given edges, such as seams, and 0 elsewhere, shape (V,).
 
     Parameters
@@ -179,6 +194,7 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
     ArgumentError
         If the array has another shape, or a pair is not an edge of the mesh.
     """
+    mesh = as_mesh(mesh)
     pairs = _checked_pairs(edges, len(mesh.vertices))
     size = len(mesh.vertices)
     not_edges = ~np.isin(edge_keys(pairs[:, 0], pairs[:, 1], size), side_keys(mesh.faces, size))
@@ -194,7 +210,7 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
 
 
 def value_map(
-    mesh: Mesh, values: ArrayLike, low: float | None = None, high: float | None = None
+    mesh: MeshLike, values: ArrayLike, low: float | None = None, high: float | None = None
 ) -> FloatArray:
     """Weights from values at the vertices, such as a texture or an attribute.
 
@@ -218,6 +234,7 @@ def value_map(
     ArgumentError
         If there is not one finite value per vertex, or the limits are equal.
     """
+    mesh = as_mesh(mesh)
     checked = checked_vertex_values("values", values, mesh, "value")
     bad = ~np.isfinite(checked)
     if bad.any():

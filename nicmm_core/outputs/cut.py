@@ -25,7 +25,7 @@ from ..geometry.curve import (
     weights_in_faces,
     with_points,
 )
-from ..geometry.mesh import Mesh, adjacent_sides, sides_among
+from ..geometry.mesh import Mesh, MeshLike, adjacent_sides, as_mesh, sides_among
 from ..geometry.surface_points import SurfacePoints, in_faces, weights_at
 from ..geometry.tolerances import ROUNDED
 from ..progress import checkpoint
@@ -161,7 +161,7 @@ class CutMesh:
 
 
 def cut_mesh(
-    mesh: Mesh,
+    mesh: MeshLike,
     curve: SurfaceCurve | Sequence[SurfaceCurve],
     snap: float = SNAP_CUT,
     deviation: float = 0.0,
@@ -202,6 +202,7 @@ def cut_mesh(
     >>> len(cut.faces) > len(mesh.faces)
     True
     """
+    mesh = as_mesh(mesh)
     snap = number_between("snap", snap, 0.0, LARGEST_SNAP)
     deviation = number_between("deviation", deviation, 0.0, np.inf, "a length")
     if not isinstance(curve, Sequence):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ControlPointError, CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, sides_among
+from ..geometry.mesh import Mesh, MeshLike, as_mesh, sides_among
 from ..geometry.sides import two_sides
 from ..geometry.surface_points import SurfacePoints, locate_points
 from .cut import CutMesh
@@ -70,7 +70,7 @@ class Region:
 
 
 def enclosed_region(
-    mesh: Mesh, cut: CutMesh, side_of: ArrayLike | SurfacePoints | None = None
+    mesh: MeshLike, cut: CutMesh, side_of: ArrayLike | SurfacePoints | None = None
 ) -> Region:
     """The region that a curve encloses.
 
@@ -96,6 +96,7 @@ def enclosed_region(
     ControlPointError
         If ``side_of`` is not a single point, lies on the curve, or is not connected to the curve.
     """
+    mesh = as_mesh(mesh)
     side = _sides(cut)
     areas = cut.mesh.face_areas
     if side_of is not None:

@@ -10,7 +10,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.__main__ import main
+from nicmm_core.commands import main
 from nicmm_core.geometry.distances import distance_to_segments
 from nicmm_core.geometry.surface_points import nearest_points
 from nicmm_core.io.files import read_curve, write_curve, write_mesh

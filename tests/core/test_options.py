@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import __main__, options
+from nicmm_core import commands, options
 from nicmm_core.arguments import checked_options
 from nicmm_core.options import Choice, Kind, Option
 from nicmm_core.request import Request
@@ -94,11 +94,11 @@ class TestAnOptionThatIsAdded:
 
     def test_command_line(self, capsys):
         with pytest.raises(SystemExit):
-            __main__.main(["design", "--help"])
+            commands.main(["design", "--help"])
         shown = capsys.readouterr().out
         for option in ADDED:
             assert f"--{option.name}" in shown
-        given = __main__._parser().parse_args(
+        given = commands.parser().parse_args(
             ["design", "m.obj", "--points", "1", "-o", "c.obj", "--ends", "at-rim", "--wavy"]
         )
         assert (given.ends, given.wavy, given.torsion) == ("at-rim", True, 2.0)

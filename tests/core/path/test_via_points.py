@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.__main__ import main
+from nicmm_core.commands import main
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.path import legs

@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.__main__ import main
+from nicmm_core.commands import main
 from nicmm_core.io.files import read_mesh, write_mesh
 from tests.core.checks import assert_valid_curve, circle, flipped, joined, renumbered
 from tests.core.symmetry.symmetric_meshes import (

@@ -12,13 +12,13 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.__main__ import main
+from nicmm_core.commands import main
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.paper.weights_file import load_network
 from tests.core.checks import assert_valid_curve
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CHOSEN = "3,60,100"
 
 
