@@ -19,7 +19,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import build
+from building import extension as packaging
 
 IN_BLENDER = "bpy" in sys.modules
 if not IN_BLENDER:
@@ -46,7 +46,7 @@ def archive(tmp_path_factory):
     """The zip for this platform, as users install it."""
     if "NICMM_TEST_ZIP" in os.environ:
         return Path(os.environ["NICMM_TEST_ZIP"])
-    return build.package(build.this_platform(), output=tmp_path_factory.mktemp("package"))
+    return packaging.package(packaging.this_platform(), output=tmp_path_factory.mktemp("package"))
 
 
 @pytest.fixture(scope="session")

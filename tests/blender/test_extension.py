@@ -14,7 +14,7 @@ import pytest
 
 import addon_utils
 
-import build
+from building import extension as packaging
 from tests.blender import scenes
 
 MENUS = (
@@ -68,7 +68,7 @@ def test_runs_from_the_installed_zip(extension):
 @pytest.mark.slow
 @pytest.mark.usefixtures("bpy_module")
 def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path):
-    build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
+    packaging.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
     ran = subprocess.run(
         [sys.executable, "-c", ENABLE + REPORT + DESIGN + REPORT + DISABLE],

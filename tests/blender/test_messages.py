@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-import build
+from building import environment
 
-DOCUMENT = build.ROOT / "docs" / "troubleshooting.md"
+DOCUMENT = environment.ROOT / "docs" / "troubleshooting.md"
 SHORTEST, WORDS = 12, 6
 """Fewest letters of a part of a message to compare, and the number of its words compared."""
 
@@ -68,16 +68,16 @@ def messages(paths, kinds):
 
 
 def of_blender():
-    return messages(sorted((build.ROOT / "nicmm_blender").rglob("*.py")), {"InputError"})
+    return messages(sorted((environment.ROOT / "nicmm_blender").rglob("*.py")), {"InputError"})
 
 
 def of_core():
-    return messages([build.ROOT / "nicmm_core" / name for name in CORE], KINDS)
+    return messages([environment.ROOT / "nicmm_core" / name for name in CORE], KINDS)
 
 
 def polls():
     """Messages of disabled buttons: constants in polls.py, and literals in other modules."""
-    for path in sorted((build.ROOT / "nicmm_blender").rglob("*.py")):
+    for path in sorted((environment.ROOT / "nicmm_blender").rglob("*.py")):
         text = path.read_text("utf-8")
         for message in re.findall(r'poll_message_set\("([^"]+)"\)', text):
             yield path.name, [plain(message)]
@@ -99,7 +99,7 @@ def test_messages_are_explained(source):
 
 def test_statuses_are_explained():
     explained = plain(DOCUMENT.read_text(encoding="utf-8"))
-    text = (build.ROOT / "nicmm_core" / "status.py").read_text(encoding="utf-8")
+    text = (environment.ROOT / "nicmm_core" / "status.py").read_text(encoding="utf-8")
     (status,) = (
         node
         for node in ast.walk(ast.parse(text))

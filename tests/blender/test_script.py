@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 import pytest
 
-import build
+from building import environment, extension
 from tests.blender import scenes
 
 pytestmark = pytest.mark.slow
 
-SCRIPT = build.ROOT / "docs" / "examples" / "design_curve.py"
+SCRIPT = environment.ROOT / "docs" / "examples" / "design_curve.py"
 
 # Does what `blender -b FILE --python SCRIPT -- ARGUMENTS` does, for the bpy module.
 RUNNER = """
@@ -32,7 +32,7 @@ finally:
 
 @pytest.mark.usefixtures("bpy_module")
 def test_documented_script(empty_scene, all_attempts, tmp_path):
-    documentation = (build.ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
+    documentation = (environment.ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
     mesh_name, indices = re.search(r"-- \\\n +(\w+) ([\d,]+) out\.blend", documentation).groups()
     bpy.ops.mesh.primitive_monkey_add()
     monkey = bpy.data.objects[mesh_name]
@@ -47,7 +47,7 @@ def test_documented_script(empty_scene, all_attempts, tmp_path):
 
     # The user folder is separate: disabling the extension removes its wheels from the folder.
     user_folder = tmp_path / "user"
-    build.stage(user_folder / "extensions" / "user_default" / "nicmm_curves")
+    extension.stage(user_folder / "extensions" / "user_default" / "nicmm_curves")
     arguments = [source, SCRIPT, "--", mesh_name, indices, output]
     ran = subprocess.run(
         [sys.executable, "-c", RUNNER, *map(str, arguments)],

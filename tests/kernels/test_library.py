@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nicmm_kernels import KernelError
 
-import build
+from building import environment
 from nicmm_core import shapes
 from nicmm_core.geometry.mesh import opposite_sides
 from tests.core.checks import curve_through, points_near
@@ -954,7 +954,7 @@ def test_missing_library_says_what_to_do(tmp_path):
     )
     ran = subprocess.run(
         [sys.executable, "-c", script],
-        cwd=build.ROOT,
+        cwd=environment.ROOT,
         env={"PYTHONPATH": "kernels", "NICMM_KERNELS_LIBRARY": str(tmp_path / "none.so")},
         capture_output=True,
         text=True,
@@ -965,14 +965,14 @@ def test_missing_library_says_what_to_do(tmp_path):
 
 
 def test_the_library_is_that_of_the_present_sources():
-    stamp = build.KERNELS / "nicmm_kernels" / "compiled.sha256"
+    stamp = environment.KERNELS / "nicmm_kernels" / "compiled.sha256"
     ran = subprocess.run(
         [
             sys.executable,
             "-c",
             "import compile_library as c; print(c.fingerprint(c.this_platform()))",
         ],
-        cwd=build.KERNELS,
+        cwd=environment.KERNELS,
         capture_output=True,
         text=True,
         check=True,

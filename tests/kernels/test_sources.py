@@ -2,9 +2,9 @@
 
 import re
 
-import build
+from building import environment
 
-SOURCES = sorted((build.KERNELS / "source").glob("*.[ch]"))
+SOURCES = sorted((environment.KERNELS / "source").glob("*.[ch]"))
 
 
 def test_lines_fit_and_are_plain_text():

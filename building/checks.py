@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The checks of `build.py test`."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from .environment import (
+    DIST,
+    KERNELS,
+    ONE_THREAD,
+    ROOT,
+    VENV_PYTHON,
+    BuildError,
+    manifest,
+    run,
+    say,
+)
+from .extension import stage
+
+
+def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
+    """Lint, format, types and tests; returns 0 if all of them pass."""
+    extension = DIST / "checked" / manifest()["id"]  # in the zip's layout, its imports are valid
+    shutil.rmtree(extension, ignore_errors=True)
+    stage(extension)
+    typed = ("mypy", "--config-file", ROOT / "pyproject.toml", "--cache-dir", ROOT / ".mypy_cache")
+    checks: tuple[tuple[str, Path, Sequence[str | Path]], ...] = (
+        ("ruff check", ROOT, ("ruff", "check")),
+        ("ruff format", ROOT, ("ruff", "format", "--check")),
+        ("mypy", ROOT, ("mypy",)),
+        ("mypy of the extension", extension, (*typed, "__init__.py", "nicmm_blender")),
+        (
+            "pytest",
+            ROOT,
+            (
+                *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
+                *(("-m", "not slow") if quick else ()),
+                *pytest_arguments,
+            ),
+        ),
+    )
+    failed = []
+    for name, folder, command in checks:
+        say(name)
+        if run([VENV_PYTHON, "-m", *command], ONE_THREAD, folder) != 0:
+            failed.append(name)
+    if failed:
+        say(f"Failed: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+def run_sanitized(arguments: Sequence[str]) -> int:
+    """Run the quick tests of the core with kernels that check themselves, compiled by gcc."""
+    if run([VENV_PYTHON, KERNELS / "compile_library.py", "sanitized"]) != 0:
+        raise BuildError("gcc with its sanitizers is needed; see the output above")
+    # Without the library of C++, the runtime aborts where a library throws an exception.
+    runtime = [
+        subprocess.run(
+            ["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for name in ("libasan.so", "libstdc++.so")
+    ]
+    environment = {
+        **ONE_THREAD,
+        "NICMM_KERNELS_LIBRARY": str(KERNELS / "nicmm_kernels/libnicmm_kernels_sanitized.so"),
+        "LD_PRELOAD": " ".join(runtime),
+        # Python itself frees little at its end, and tests ask for more memory than there is.
+        "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",
+    }
+    options = ["--numprocesses=auto", "--dist=worksteal", "-m", "not slow"]
+    where = arguments or ["tests/core", "tests/kernels"]
+    return run([VENV_PYTHON, "-m", "pytest", *options, *where], environment)
+
+
+def compare_platforms() -> int:
+    """Compare the results of the kernels of all platforms, bit by bit."""
+    return run([VENV_PYTHON, "-m", "tests.kernels.platforms.compare"], ONE_THREAD)
