@@ -74,7 +74,7 @@ def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
     except _UNREADABLE as error:
         raise ArgumentError(
             f"{path} cannot be read as network weights ({error}); create the file with "
-            "'python -m nicmm_core pretrain'"
+            "'nicmm pretrain'"
         ) from error
     return Network(config, arrays)
 
