@@ -352,7 +352,7 @@ def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
     (E,) int array
         Number of faces: 1 on the boundary, 2 inside, more at non-manifold edges.
     """
-    return _edges(side_keys(faces), int(faces.max()) + 1)
+    return _edges(side_keys(faces), int(faces.max(initial=0)) + 1)
 
 
 def corners_differ(faces: IntArray) -> BoolArray:

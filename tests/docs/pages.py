@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -28,13 +27,12 @@ def is_for_blender(code: str) -> bool:
     return "bpy." in code
 
 
-def numbered_sphere() -> nicmm.Mesh:
-    """A sphere whose vertices with x > 0.2 come first, in random order.
+def numbered(mesh: nicmm.Mesh) -> nicmm.Mesh:
+    """The mesh with its vertices with x > 0.2 first, in random order.
 
     The documentation uses some of the first ones, which lie on one side of the plane x = 0. The
-    seed is one with which curves that avoid each other do not separate the points of others.
+    seed is one with which, on a sphere, curves that avoid each other do not separate points.
     """
-    mesh = shapes.sphere(4)
     order = np.random.default_rng(34).permutation(len(mesh.vertices))
     order = order[np.argsort(mesh.vertices[order, 0] <= 0.2, kind="stable")]
     place = np.argsort(order)

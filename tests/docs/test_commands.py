@@ -5,8 +5,9 @@ import shlex
 import pytest
 
 import nicmm_core as nicmm
+from nicmm_core import shapes
 from nicmm_core.commands import main
-from tests.docs.pages import PAGES, blocks, numbered_sphere
+from tests.docs.pages import PAGES, blocks, numbered
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +27,7 @@ LINES = {
 )
 def test_commands_of_a_page(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    nicmm.write_mesh("mesh.obj", numbered_sphere())
+    nicmm.write_mesh("mesh.obj", numbered(shapes.sphere(4)))
     for table in blocks(page, "text"):
         (tmp_path / "jobs.csv").write_text(table, encoding="utf-8")
     for line in LINES[page]:

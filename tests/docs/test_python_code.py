@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from tests.docs.pages import PAGES, ROOT, blocks, is_for_blender, numbered_sphere
+from tests.docs.pages import PAGES, ROOT, blocks, is_for_blender, numbered
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,7 @@ NOTEBOOK = ROOT / "docs" / "examples" / "first_curves.ipynb"
 
 def names(page, folder):
     """What the code of a page may use without defining it."""
-    mesh = shapes.cube(16) if page.name == "feature_loops.md" else numbered_sphere()
+    mesh = shapes.cube(16) if page.name == "feature_loops.md" else numbered(shapes.sphere(4))
     nicmm.write_mesh(folder / "mesh.obj", mesh)
     beside = next(v for v in mesh.faces[(mesh.faces == 41).any(axis=1)][0] if v != 41)
     angle = np.linspace(0.0, 2.0, 100)

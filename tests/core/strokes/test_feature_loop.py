@@ -83,6 +83,16 @@ def test_the_rim_of_painted_weights_is_followed():
     np.testing.assert_allclose(found[:, 2], 0.5, atol=0.1)
 
 
+def test_a_painted_region_without_a_whole_face_has_no_rim():
+    """The sharp edge next to the point is followed as if nothing were painted."""
+    mesh = shapes.cube(6)
+    edge = np.flatnonzero((mesh.vertices[:, :2] == mesh.vertices.max()).all(axis=1))[3]
+    weights = np.zeros(len(mesh.vertices))
+    weights[edge] = 1.0
+    painted = nicmm.feature_loop(mesh, [edge], weights=weights)
+    np.testing.assert_array_equal(painted, nicmm.feature_loop(mesh, [edge]))
+
+
 def test_without_a_feature_there_is_an_error():
     mesh = shapes.sphere(3)
     with pytest.raises(nicmm.UnreachableError, match="no sharp edge"):
