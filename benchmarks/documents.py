@@ -140,7 +140,7 @@ def _courses(results: Results) -> str:
             f"default has {closed:.2f} times as much for closed curves and {open_:.2f} times for "
             f"open ones (geometric means of {len(ratios[True])} each; at most "
             f"{max(ratios[True]):.2f} and {max(ratios[False]):.2f} times) "
-            "([measured](benchmarks/RESULTS.md#which-course-a-curve-takes))."
+            "([measured](../benchmarks/RESULTS.md#which-course-a-curve-takes))."
         )
         + "\n"
         + _item(
@@ -181,7 +181,7 @@ def _stages(results: Results) -> str:
     return _item(
         f"On a mesh of {body['faces'] / 1e6:.1f} million faces the first curve takes {first:.1f} "
         f"seconds, a further curve {another:.1f} seconds, and an update while a point is dragged "
-        f"{dragged:.2f} seconds ([by stage](benchmarks/RESULTS.md#where-the-time-goes))."
+        f"{dragged:.2f} seconds ([by stage](../benchmarks/RESULTS.md#where-the-time-goes))."
     )
 
 
@@ -225,7 +225,7 @@ def _cancellation(results: Results) -> str:
         f"A design checks for cancellation at least every {small:.2f} seconds of processor time on "
         f"meshes of up to 100,000 faces, every {longest:.2f} seconds at {large / 1e6:.1f} million "
         f"faces, and every {soup:.2f} seconds on a soup of as many triangles "
-        "([measured](benchmarks/RESULTS.md#cancelling))."
+        "([measured](../benchmarks/RESULTS.md#cancelling))."
     )
 
 
@@ -239,7 +239,7 @@ def _degraded(results: Results) -> str:
         "The curve on a degraded mesh is smooth too, but not always the same: by severity, the "
         f"median of its mean distance from the clean mesh's curve is {min(means):.1f} to "
         f"{max(means):.1f} % of the diagonal "
-        "([measured](benchmarks/RESULTS.md#what-moves-a-curve-on-degraded-meshes))."
+        "([measured](../benchmarks/RESULTS.md#what-moves-a-curve-on-degraded-meshes))."
     )
 
 

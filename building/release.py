@@ -73,7 +73,7 @@ def release(folder: Path, tests: bool) -> int:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     made = Release(folder, [])
-    made.check("the version has a section in the changelog", _changelog)
+    made.check("the version has a section in the changelog", changelog)
     made.check("the sources are those of a commit", _commit)
     if tests:
         made.check("lint, types and all tests", _tests)
@@ -104,7 +104,7 @@ def report(rows: Sequence[tuple[str, bool, str]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _changelog() -> str:
+def changelog() -> str:
     version = manifest()["version"]
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     if not re.search(rf"^## {re.escape(version)} – \d{{4}}-\d\d-\d\d$", text, re.MULTILINE):

@@ -112,8 +112,7 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         radius = tube_radius.radius_of(original)
         radius *= curve_object.scale_in_scene(original, mesh_object)
         found: dict[str, str | float] = {"radius": radius}
-        if drawn is not None:
-            found |= {"spline": drawn["spline"], "offset": drawn["offset"]}
+        found |= {"spline": drawn["spline"], "offset": drawn["offset"]}
         if not radius:
             found["thickness"] = 0.0  # it would be used instead of a radius of zero
         is_set = self.properties.is_property_set

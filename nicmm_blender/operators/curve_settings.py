@@ -70,8 +70,6 @@ def _read(group: bpy.types.PropertyGroup, name: str, default: Value) -> Value:
     try:
         if name in DRAWING:
             drawn = curve_record.drawn_as(curve)
-            if drawn is None:
-                return default
             return drawn["spline"] if name == "spline" else drawn["offset"]
         return getattr(curve_record.settings_of(curve), name)
     except InputError:
@@ -134,19 +132,15 @@ def _change(curve: bpy.types.Object, name: str, value: Value) -> list[str]:
     if name in DRAWING:
         opened = edited_curve.open_curve(context, curve)
         before = curve_record.drawn_as(curve)
-        drawn = before or {"spline": "EXACT", "offset": 0.0}
         curves = (
             curve_record.read_curves(curve, opened.surface) if curve_record.has_curve(curve) else []
         )
         record = curve[curve_order.RECORD_KEY]
-        record["drawn"] = {**drawn, name: value}
+        record["drawn"] = {**before, name: value}
         try:
             writing.redraw(curve, opened.surface, curves, opened.points.corners, opened.mirror)
         except BaseException:
-            if before is None:
-                del record["drawn"]
-            else:
-                record["drawn"] = before
+            record["drawn"] = before
             raise
         surface_cache.note_change()
         return []

@@ -404,7 +404,7 @@ def _record(
     edited: Opened,
     points: ControlPoints,
     curves: list[SurfaceCurve],
-    drawn: Drawn | None,
+    drawn: Drawn,
 ) -> None:
     points = snapped(edited, points)
     curve_settings = replace(edited.settings, method="ELASTIC")

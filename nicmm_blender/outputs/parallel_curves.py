@@ -151,7 +151,7 @@ def add(
             "No place on that side of the curve is so far away. Use a smaller Distance, or the "
             "other side"
         )
-    drawn = curve_record.drawn_as(source) or {"spline": EXACT, "offset": 0.0}
+    drawn = curve_record.drawn_as(source)
     radius = tube_radius.radius_of(source) * curve_object.scale_of(source, surface)
     shown = splines(surface, found, Drawing(radius=radius, **drawn), np.zeros(0, dtype=bool))
     parallel = curve_object.new_object(mesh_object, surface, shown, radius)

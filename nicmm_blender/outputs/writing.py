@@ -183,13 +183,10 @@ def redraw(
     corners = mirror_images.corners_along(curves, corners, mirror)
     if drawn.data.users - drawn.data.use_fake_user > 1:
         drawn.data = drawn.data.copy()
-    kind = curve_record.drawn_as(drawn)
-    if kind is None:  # an object of an earlier version is in the space of its mesh
-        kind = {"spline": EXACT, "offset": 0.0}
-    elif curve_object.is_child(drawn):
+    if curve_object.is_child(drawn):
         _parent_again(drawn, surface)
     radius = tube_radius.radius_of(drawn) * curve_object.scale_of(drawn, surface)
-    drawing = Drawing(radius=radius, **kind)
+    drawing = Drawing(radius=radius, **curve_record.drawn_as(drawn))
     if drawn.type == "CURVES":
         sticky_curves.write(drawn, surface, curves, drawing, corners)
     else:
@@ -210,8 +207,7 @@ def _parent_again(drawn: bpy.types.Object, surface: Surface) -> None:
 
 def show_unfinished(drawn: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
     """Show curves that are being changed in their object, with all points of the exact curves."""
-    kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
-    drawing = Drawing(EXACT, 0.0, kind["offset"])
+    drawing = Drawing(EXACT, 0.0, curve_record.drawn_as(drawn)["offset"])
     no_corners = np.zeros(0, dtype=bool)  # exact curves are sharp anyway
     if drawn.type == "CURVES":
         sticky_curves.write(drawn, surface, curves, drawing, no_corners)

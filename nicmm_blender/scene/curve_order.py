@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The order of the curves of a mesh: a curve can avoid those above it in the list.
 
-Each record stores a rank. A new curve gets the greatest rank plus one. Curves of earlier versions
-have no rank and come before the others, by their names, as do those of equal rank.
+Each record stores a rank. A new curve gets the greatest rank plus one. Curves of equal rank are in
+the order of their names.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ RANK = "rank"
 """Name of the field of a record."""
 
 UNRANKED = -1
-"""Rank of a curve of an earlier version."""
+"""Rank of a curve with a damaged record, which comes before the others."""
 
 RECORD_KEY = "nicmm_curve"
 """Custom property of the object that holds the record."""

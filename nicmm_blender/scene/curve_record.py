@@ -40,13 +40,8 @@ CONTROL, VIA = "control_", "via_"
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
-VERSION = 5
-"""Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
-of version 1 do not store whether modifiers are used, those up to 2 have `FORMER_METHODS`, those up
-to 3 have no via points, and those up to 4 no mirror, no rank and no junctions."""
-
-FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
-"""Methods by their names in records of versions before 3."""
+VERSION = 6
+"""Version of the record's format. That of release 1.0.0 is 6; no release wrote an earlier one."""
 
 SAME_PLACE = 1e-5
 """Distance, in diagonals of the mesh, up to which a control point counts as not moved."""
@@ -71,15 +66,6 @@ def property_name(option: Option) -> str:
     """The name of the Blender property for a core option; for weights it names a vertex group."""
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
-
-UNCHANGED = (
-    ", use_modifiers=False",
-    ", normal_bending=0.0",
-    ", avoid_others=False",
-    ", mirror_axis='NONE'",
-    ", mirror_as='JOINED'",
-)
-"""Settings whose values were the only ones before there were these settings."""
 
 NEW_CURVE_OPTIONS = ("order", "alternatives")
 """Options that matter only once, since control points are stored in the order visited."""
@@ -167,7 +153,7 @@ def write_record(
     surface: Surface,
     curves: list[SurfaceCurve],
     settings: CurveSettings,
-    drawn: Drawn | None,
+    drawn: Drawn,
     corners: np.ndarray,
     controls: SurfacePoints | None = None,
     via: ViaPoints | None = None,
@@ -187,9 +173,8 @@ def write_record(
         The curves; empty for a drawing that has too few points.
     settings : CurveSettings
         Settings of the curves.
-    drawn : dict or None
-        Spline type and offset of the drawing; None for an object of an earlier version, which drew
-        all points.
+    drawn : dict
+        Spline type and offset of the drawing.
     corners : (k,) bool array
         Whether each control point is a corner.
     controls : SurfacePoints, optional
@@ -215,7 +200,7 @@ def write_record(
         "corner_points": corners.astype(int).tolist(),
         **_junctions_to_store(surface, controls, others),
         "asked": asdict(settings),
-        **({} if drawn is None else {"drawn": drawn}),
+        "drawn": drawn,
     }
     # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings, others)
@@ -307,14 +292,8 @@ def digest(
 
     `others` are the curves that it avoids; their order does not matter.
     """
-    # Digests in saved files must remain valid: the text begins with the first name of the class,
-    # methods have their former names, and without modifiers it is that of version 1.
-    former = {now: before for before, now in FORMER_METHODS.items()}
-    settings = settings.with_value("method", former.get(settings.method, settings.method))
-    words = "Asked" + repr(settings).removeprefix(CurveSettings.__name__)
-    for setting in UNCHANGED:
-        words = words.replace(setting, "")
-    found = hashlib.blake2b(words.encode(), digest_size=16)
+    # Digests in saved files must remain valid: leave out a new setting while it has its default.
+    found = hashlib.blake2b(repr(settings).encode(), digest_size=16)
     found.update(surface.core_positions.tobytes())
     found.update(surface.faces.tobytes())
     if settings.clearance > 0.0 and surface.unit != 1.0:
@@ -350,13 +329,18 @@ def _checked_record(curve_object: bpy.types.Object) -> Record:
 def _record_with_checked_settings(curve_object: bpy.types.Object) -> Record:
     """The record of a curve; an error if its version or settings cannot be used."""
     record = curve_object[RECORD_KEY]
-    version = record.get("version", 0)
+    version = record.get("version")
     if not isinstance(version, int):
         _refuse(curve_object, f"its version is {version!r}")
     if version > VERSION:
         raise InputError(
             f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
             "Update the extension to use it"
+        )
+    if version < VERSION:
+        raise InputError(
+            f'"{curve_object.name}" was designed by a version of NICMM Curves before 1.0.0, which '
+            "was never released. Delete it and draw it again"
         )
     _refuse(curve_object, record_check.problem_of_settings(record, CurveSettings))
     return record
@@ -506,26 +490,17 @@ def take_place_of(converted: bpy.types.Object, original: bpy.types.Object) -> No
 
 def settings_of(curve_object: bpy.types.Object) -> CurveSettings:
     """The settings of a curve."""
-    record = _record_with_checked_settings(curve_object)
-    stored = record.get("asked")
-    if stored is None:  # an early record without settings
-        return CurveSettings(closed=bool(record["closed"][0]), use_modifiers=False)
-    before = {"use_modifiers": False}  # how versions behaved that did not record a setting
-    found = CurveSettings(
-        **{
-            name: type(default)(stored.get(name, before.get(name, default)))
-            for name, default in asdict(CurveSettings()).items()
-        }
+    stored = _record_with_checked_settings(curve_object)["asked"]
+    defaults = asdict(CurveSettings())
+    return CurveSettings(
+        **{name: type(default)(stored.get(name, default)) for name, default in defaults.items()}
     )
-    if record.get("version", 0) < 3:
-        return replace(found, method=FORMER_METHODS.get(found.method, found.method))
-    return found
 
 
-def drawn_as(curve_object: bpy.types.Object) -> Drawn | None:
-    """How a curve is drawn; None if an earlier version made it, which drew all points."""
-    found = _record_with_checked_settings(curve_object).get("drawn")
-    return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
+def drawn_as(curve_object: bpy.types.Object) -> Drawn:
+    """How a curve is drawn."""
+    found = _record_with_checked_settings(curve_object)["drawn"]
+    return {"spline": found["spline"], "offset": found["offset"]}
 
 
 def no_curve_message(curve_object: bpy.types.Object) -> str:
@@ -578,14 +553,7 @@ def read_control_points(
     The face of a point is -1 if its triangle no longer exists. Positions, (k, 3), are in the local
     space of the mesh object.
     """
-    from ... import nicmm_core as nicmm
-
     record = _checked_record(curve_object)
-    if "control_corners" not in record:  # an early record without control points
-        (curve,) = read_curves(curve_object, surface)
-        index = curve.control_index
-        found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
-        return found, surface.points(found.faces, found.barycentric)
     return _read_points(record, CONTROL, surface)
 
 
@@ -655,12 +623,7 @@ def _on_surface(
 
 def corners_of(curve_object: bpy.types.Object) -> np.ndarray:
     """Whether each control point of a curve is a corner, (k,)."""
-    record = _checked_record(curve_object)
-    if "control_corners" not in record:  # an early record without control points
-        return np.zeros(sum(index >= 0 for index in record["control_index"]), dtype=bool)
-    if "corner_points" not in record:  # of a version without corners
-        return np.zeros(len(record["control_corners"]) // 3, dtype=bool)
-    return np.array(record["corner_points"], dtype=bool)
+    return np.array(_checked_record(curve_object)["corner_points"], dtype=bool)
 
 
 def _cage_points(
@@ -732,8 +695,6 @@ def _is_elsewhere(record: Record, surface: Surface) -> bool:
     """
     from ...nicmm_core.geometry.surface_points import nearest_points
 
-    if "control_corners" not in record:  # an early record without control points
-        return False
     corners = np.array(record["control_corners"], dtype=np.int64).reshape(-1, 3)
     weights = np.array(record["control_barycentric"], dtype=np.float64).reshape(-1, 3)
     former = np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)

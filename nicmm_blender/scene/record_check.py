@@ -62,12 +62,8 @@ def _check_points(record: Record) -> None:
     vertices = record.get("vertices")
     if not isinstance(vertices, int) or vertices < 0:
         raise _DamagedError(f"its number of vertices is {vertices!r}")
-    if "control_corners" not in record:  # an early record without control points
-        if len(counts) != 1:
-            raise _DamagedError(f"it has no control points and {len(counts)} curves")
-        return
     count = _check_stored(record, "control_")
-    if "corner_points" in record and (_whole(record, "corner_points", count, least=0) > 1).any():
+    if (_whole(record, "corner_points", count, least=0) > 1).any():
         raise _DamagedError("corner_points has values other than 0 and 1")
     _check_mirror(record, count, control_counts)
     if "via_legs" in record:
@@ -90,8 +86,8 @@ def _check_mirror(record: Record, count: int, control_counts: np.ndarray) -> Non
     control_counts : int array
         Number of control points of each curve, images included.
     """
-    asked = record.get("asked")
-    if asked is None or asked.get("mirror_axis", mirror_plane.NONE) == mirror_plane.NONE:
+    asked = record["asked"]
+    if asked.get("mirror_axis", mirror_plane.NONE) == mirror_plane.NONE:
         return
     if asked.get("mirror_as") == mirror_plane.PAIR:
         fits = control_counts.tolist() in ([], [count, count])
@@ -105,7 +101,7 @@ def _check_mirror(record: Record, count: int, control_counts: np.ndarray) -> Non
 
 def _check_junctions(record: Record, count: int) -> None:
     """Check the junctions among the control points, and the rank."""
-    rank = record.get("rank", 0)
+    rank = record.get("rank")
     if not isinstance(rank, int):
         raise _DamagedError(f"its rank is {rank!r}")
     stored = record.get("junctions", ())
@@ -143,24 +139,16 @@ def _check_stored(record: Record, kind: str) -> int:
 
 
 def _check_settings(record: Record, settings_type: type) -> None:
-    settings, drawn = record.get("asked"), record.get("drawn")
-    if settings is None:
-        if not len(_whole(record, "closed")):
-            raise _DamagedError("it has neither settings nor a curve")
-    elif not is_group(settings):
+    settings: Any = record.get("asked")
+    drawn: Any = record.get("drawn")
+    if not is_group(settings):
         raise _DamagedError("asked is not a group of properties")
-    else:
-        for field in fields(settings_type):
-            value = settings.get(field.name, field.default)
-            if not (
-                isinstance(value, str) if isinstance(field.default, str) else _is_finite(value)
-            ):
-                raise _DamagedError(f"its setting {field.name} is {value!r}")
-            if value not in mirror_plane.CHOICES.get(field.name, (value,)):
-                raise _DamagedError(f"its setting {field.name} is {value!r}")
-    if drawn is not None and not (
-        is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))
-    ):
+    for field in fields(settings_type):
+        value = settings.get(field.name, field.default)
+        fits = isinstance(value, str) if isinstance(field.default, str) else _is_finite(value)
+        if not fits or value not in mirror_plane.CHOICES.get(field.name, (value,)):
+            raise _DamagedError(f"its setting {field.name} is {value!r}")
+    if not (is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))):
         raise _DamagedError("drawn does not describe how the curve is drawn")
 
 

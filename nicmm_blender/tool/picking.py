@@ -392,9 +392,8 @@ def radius_of(curve: bpy.types.Object, surface: Surface) -> float:
     from ..outputs import curve_object, tube_radius
 
     radius = tube_radius.radius_of(curve)
-    drawn = curve_record.drawn_as(curve)
-    offset = 0.0 if drawn is None else abs(drawn["offset"])
-    return (radius * curve_object.scale_of(curve, surface) + offset) / surface.scale
+    reach = radius * curve_object.scale_of(curve, surface)
+    return (reach + abs(curve_record.drawn_as(curve)["offset"])) / surface.scale
 
 
 def _is_shown(context: bpy.types.Context, candidate: bpy.types.Object | None) -> bool:

@@ -203,13 +203,11 @@ class TestOrder:
             assert moved == {"CANCELLED"}
         assert order(empty_scene, bpy.data.objects[sphere.name]) == ["A", "B", "C"]
 
-    def test_curves_of_earlier_versions_come_first_by_name(self, empty_scene, sphere):
+    def test_curves_of_equal_rank_are_ordered_by_name(self, empty_scene, sphere):
         for name, height in (("New", 0.0), ("Old B", 0.3), ("Old A", 0.6)):
             draw(sphere, around(height), name)
         for name in ("Old A", "Old B"):
-            record = bpy.data.objects[name]["nicmm_curve"]
-            del record["rank"]
-            record["version"] = 4
+            bpy.data.objects[name]["nicmm_curve"]["rank"] = -1
         assert order(empty_scene, sphere) == ["Old A", "Old B", "New"]
         call("move_curve", curve="New", direction="UP")
         assert order(empty_scene, sphere) == ["Old A", "New", "Old B"]
@@ -535,10 +533,6 @@ class TestLive:
 
 
 class TestRecords:
-    def test_digests_of_curves_that_avoid_nothing_are_as_before(self, empty_scene):
-        record = module(empty_scene, "scene.curve_record")
-        assert ", avoid_others=False" in record.UNCHANGED
-
     def test_saved_and_reopened(self, empty_scene, pair, tmp_path):
         mesh_name = pair.name
         before = {name: points_of(empty_scene, name) for name in ("First", "Second")}

@@ -327,19 +327,6 @@ def test_files_keep_corners(square, tmp_path):
     assert corners(bpy.data.objects[name]) == [1, 0, 1, 1]
 
 
-def test_records_without_corners_are_read(square, plane, empty_scene):
-    """Versions without corners did not write them; the digest is the same."""
-    record = module(empty_scene, "scene.curve_record")
-    before = record.digest_of(square)
-    del square["nicmm_curve"]["corner_points"]
-    surface = record.surface_of(square, plane)
-    assert record.is_current(square, record.digest(plane, surface, record.settings_of(square)))
-    assert not record.corners_of(square).any()
-    call("toggle_corner", index=2)
-    assert corners(square) == [0, 0, 1, 0]
-    assert record.digest_of(square) == before
-
-
 @pytest.mark.parametrize("damaged", [[1, 1], [0, 1, 2, 0], [0.5, 0, 0, 0], "yes", [-1, 0, 0, 0]])
 def test_damaged_corners_are_refused(square, damaged):
     square["nicmm_curve"]["corner_points"] = damaged

@@ -1,4 +1,4 @@
-"""Files saved by earlier versions: their curves can still be converted, edited and updated."""
+"""Files saved by each release: their curves can still be converted, edited and updated."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def controls(extension, curve):
 
 
 def test_there_are_some():
-    assert "0.1.0" in [path.stem for path in FILES]
+    assert "1.0.0" in [path.stem for path in FILES]
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -154,22 +154,14 @@ def test_outputs_that_changed_their_mesh(kept):
 
 
 @pytest.mark.parametrize(
-    ("version", "recorded", "method"),
-    [(2, "NICMM", "ELASTIC"), (2, "NICMM_PAPER", "NICMM"), (3, "NICMM", "NICMM")],
+    ("version", "message"),
+    [(99, "newer version of NICMM Curves"), (5, "before 1.0.0, which was never released")],
 )
-def test_methods_had_other_names_before_version_3(kept, version, recorded, method):
+def test_a_record_of_another_version_says_so(kept, version, message):
     curve = bpy.data.objects["Closed"]
     record = curve["nicmm_curve"].to_dict()
-    asked = {**record["asked"], "method": recorded}
-    curve["nicmm_curve"] = {**record, "version": version, "asked": asked}
-    assert module(kept, "scene.curve_record").settings_of(curve).method == method
-
-
-def test_a_record_of_a_newer_version_says_so(kept):
-    curve = bpy.data.objects["Closed"]
-    record = curve["nicmm_curve"].to_dict()
-    curve["nicmm_curve"] = {**record, "version": 99}
+    curve["nicmm_curve"] = {**record, "version": version}
     scenes.activate(curve)
-    with pytest.raises(RuntimeError, match="newer version of NICMM Curves"):
+    with pytest.raises(RuntimeError, match=message):
         bpy.ops.nicmm.convert_curve(output="STICKY")
     assert bpy.data.objects["Closed"] == curve

@@ -46,6 +46,7 @@ def draw(mesh_object, name, vertices, **settings):
     bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = mesh_object
     points = ", ".join(map(str, vertices))
+    settings = {"spline": "EXACT", **settings}
     assert bpy.ops.nicmm.design_curve(points=points, **settings) == {"FINISHED"}
     made = bpy.context.active_object
     if made != mesh_object:
@@ -73,7 +74,7 @@ def make(path):
     places = [(0.9, 0.1, 0.4), (0.1, 0.9, -0.4), (-0.9, 0.1, 0.4), (-0.1, -0.9, -0.4)]
     places = [tuple(body.closest_point_on_mesh(place)[1]) for place in places]
     points = [{"name": "", "position": place} for place in places]
-    assert bpy.ops.nicmm.edit_curve(points=points) == {"FINISHED"}
+    assert bpy.ops.nicmm.edit_curve(points=points, spline="EXACT") == {"FINISHED"}
     bpy.context.active_object.name = "Placed"
     # Outputs that change their mesh, each on a separate mesh.
     for number, (name, settings) in enumerate(
