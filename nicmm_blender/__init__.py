@@ -2,14 +2,14 @@
 """The Blender extension: reads Blender's data, calls the core, and writes Blender's data.
 
 The folders form layers, and each imports only from those before it: `scene`, `outputs`,
-`operators`, `tool`, `interface`.
+`operators`, `tool`, `interface`. `translations` has labels and tooltips in other languages.
 
 Nothing here loads the core, or a library that the core needs, before a curve is requested. The
 extension can therefore be enabled quickly, even if a library is missing; the operator then reports
 which one.
 """
 
-from . import command_line, preferences, settings
+from . import command_line, preferences, settings, translations
 from .interface import curve_list, map_rows, menus, panels
 from .operators import (
     convert_curve,
@@ -43,6 +43,7 @@ from .tool import (
 )
 
 MODULES = (
+    translations,
     preferences,
     settings,
     surface_cache,

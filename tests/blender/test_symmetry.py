@@ -652,39 +652,6 @@ def test_asymmetry_is_reported(sphere, empty_scene):
 # Records.
 
 
-def test_records_without_a_mirror_are_read(sphere, empty_scene):
-    """Earlier versions did not write one; the digest is the same."""
-    record = module(empty_scene, "scene.curve_record")
-    curve = draw(sphere, mirror_axis="NONE")
-    for name in ("mirror_axis", "mirror_as"):
-        del curve["nicmm_curve"]["asked"][name]
-    curve["nicmm_curve"]["version"] = 4
-    settings = record.settings_of(curve)
-    assert (settings.mirror_axis, settings.mirror_as) == ("NONE", "JOINED")
-    surface = record.surface_of(curve, sphere)
-    assert record.is_current(curve, record.digest(sphere, surface, settings))
-    curve.nicmm_settings.mirror_axis = "X"
-    assert curve["nicmm_curve"]["version"] == 5
-    assert asymmetry(curve) < SYMMETRIC
-
-
-def test_the_digest_of_a_curve_without_a_mirror_is_that_of_before(sphere, empty_scene):
-    record = module(empty_scene, "scene.curve_record")
-    settings = record.CurveSettings()
-    assert "mirror" in repr(settings)
-    words = repr(settings)
-    for setting in record.UNCHANGED:
-        words = words.replace(setting, "")
-    assert "mirror" not in words
-    surface = record.read(sphere, True)
-    digests = {
-        record.digest(sphere, surface, record.CurveSettings(mirror_axis=axis, mirror_as=how))
-        for axis in "XYZ"
-        for how in ("JOINED", "PAIR")
-    }
-    assert len(digests) == 6
-
-
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 def test_files_keep_the_mirror(sphere, how, tmp_path):
     curve = draw(sphere, mirror_as=how)
