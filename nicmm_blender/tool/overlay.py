@@ -45,6 +45,9 @@ RING_RADIUS, HOLE_RADIUS, IMAGE_HOLE = 6.5, 4.5, 3.0
 PLANE_WIDTH = 1.0
 """Sizes in pixels at a resolution scale of 1."""
 
+DASHES = 40
+"""Number of dashes of a line with a problem, which can be told from others without its colour."""
+
 DISC_SIDES = 20
 """Number of sides of the disc that shows a control point, and of the ring of a via point."""
 
@@ -75,6 +78,7 @@ class _State:
         self.hover: picking.Hit | None = None
         self.batches: list[gpu.types.GPUBatch] = []
         self.batches_of: list[np.ndarray] = []
+        self.dashed = False
         self.plane: gpu.types.GPUBatch | None = None
         self.plane_of: PlaneSection | None = None
         self.visible: np.ndarray = np.zeros(0, dtype=bool)
@@ -154,7 +158,7 @@ def _draw_lines() -> None:
         draw_layers(context, nearer, plane, layers, PLANE)
     nearer = towards_the_eye(context.region_data, mesh_object, surface, drawn.radius)
     colour = colours.problem if drawn.problem else colours.line
-    for batch in _line_batches(drawn.lines):
+    for batch in _line_batches(drawn.lines, bool(drawn.problem)):
         draw_line(context, nearer, batch, colour)
     hit = _hover_on(drawn)
     if hit is not None and hit.kind is Kind.CURVE:
@@ -206,13 +210,31 @@ def draw_layers(
     gpu.state.blend_set("NONE")
 
 
-def _line_batches(lines: list[np.ndarray]) -> list[gpu.types.GPUBatch]:
+def _line_batches(lines: list[np.ndarray], dashed: bool) -> list[gpu.types.GPUBatch]:
     """The batches of the active lines, rebuilt only if the lines have changed."""
     before = _state.batches_of
     same = len(before) == len(lines) and all(map(np.array_equal, before, lines))
-    if not same:
-        _state.batches, _state.batches_of = [batch_of_line(line) for line in lines], lines
+    if not same or dashed != _state.dashed:
+        batch_of = _batch_of_dashes if dashed else batch_of_line
+        _state.batches = [batch_of(line) for line in lines]
+        _state.batches_of, _state.dashed = lines, dashed
     return _state.batches
+
+
+def _batch_of_dashes(line: np.ndarray) -> gpu.types.GPUBatch:
+    """The batch of a dashed line, (n, 3), for `draw_line`."""
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    ends = dashes(line).reshape(-1, 3)
+    return batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+
+
+def dashes(line: np.ndarray) -> np.ndarray:
+    """The ends of the segments of a line, (n, 3), that lie on its dashes, (m, 2, 3)."""
+    segments = np.stack([line[:-1], line[1:]], axis=1)
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    middle = np.cumsum(length) - 0.5 * length
+    dash = (2 * DASHES * middle / max(length.sum(), np.finfo(float).tiny)).astype(int)
+    return segments[dash % 2 == 0]
 
 
 def _plane_batch(opened: Opened) -> gpu.types.GPUBatch | None:
