@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .environment import (
@@ -21,6 +21,9 @@ from .environment import (
 )
 from .extension import stage
 
+WITH_BLENDER = ("tests/blender", "tests/benchmarks")
+"""Folders of the tests that import Blender's module; the benchmarks render with it."""
+
 
 def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
     """Lint, format, types and tests; returns 0 if all of them pass."""
@@ -33,15 +36,7 @@ def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
         ("ruff format", ROOT, ("ruff", "format", "--check")),
         ("mypy", ROOT, ("mypy",)),
         ("mypy of the extension", extension, (*typed, "__init__.py", "nicmm_blender")),
-        (
-            "pytest",
-            ROOT,
-            (
-                *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
-                *(("-m", "not slow") if quick else ()),
-                *pytest_arguments,
-            ),
-        ),
+        *((name, ROOT, command) for name, command in _pytest_commands(quick, pytest_arguments)),
     )
     failed = []
     for name, folder, command in checks:
@@ -51,6 +46,23 @@ def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
     if failed:
         say(f"Failed: {', '.join(failed)}")
     return 1 if failed else 0
+
+
+def _pytest_commands(
+    quick: bool, given: Sequence[str]
+) -> Iterator[tuple[str, Sequence[str | Path]]]:
+    """Names and arguments of the runs of pytest.
+
+    Tests that import Blender's module run on their own, so that the others run as users of the
+    package do, without it.
+    """
+    command = ["pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"]
+    command += ["-m", "not slow"] if quick else []
+    if given:
+        yield "pytest", [*command, *given]
+        return
+    yield "pytest with Blender", [*command, *WITH_BLENDER]
+    yield "pytest without Blender", [*command, *(f"--ignore={path}" for path in WITH_BLENDER)]
 
 
 def run_sanitized(arguments: Sequence[str]) -> int:
