@@ -22,7 +22,11 @@ from .environment import (
 from .extension import stage
 
 WITH_BLENDER = ("tests/blender", "tests/benchmarks")
-"""Folders of the tests that import Blender's module; the benchmarks render with it."""
+"""Folders of the tests that import Blender's module; the benchmarks render with it.
+
+PyTorch and Blender's module do not share a process well: after hundreds of tests with both, workers
+have crashed.
+"""
 
 
 def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
@@ -53,16 +57,17 @@ def _pytest_commands(
 ) -> Iterator[tuple[str, Sequence[str | Path]]]:
     """Names and arguments of the runs of pytest.
 
-    Tests that import Blender's module run on their own, so that the others run as users of the
-    package do, without it.
+    Each folder whose tests import Blender's module has processes of its own, and the other tests
+    run without it, as users of the package do.
     """
     command = ["pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"]
     command += ["-m", "not slow"] if quick else []
     if given:
         yield "pytest", [*command, *given]
         return
-    yield "pytest with Blender", [*command, *WITH_BLENDER]
-    yield "pytest without Blender", [*command, *(f"--ignore={path}" for path in WITH_BLENDER)]
+    for folder in WITH_BLENDER:
+        yield f"pytest of {folder}", [*command, folder]
+    yield "pytest of the others", [*command, *(f"--ignore={path}" for path in WITH_BLENDER)]
 
 
 def run_sanitized(arguments: Sequence[str]) -> int:
