@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -90,33 +91,36 @@ def download(requirement: str, blender_platform: str, python: str) -> Path:
     pattern = f"{name}-{version}-*.whl"
     if not list(folder.glob(pattern)):
         say(f"Downloading {requirement} for {blender_platform}, Python {python}")
-        command = [str(VENV_PYTHON), "-m", "pip", "download", "--quiet", "--no-deps"]
-        command += ["--only-binary=:all:", "--python-version", python, "--dest", str(folder)]
-        for tag in PLATFORMS[blender_platform]:
-            command += ["--platform", tag]
-        if run([*command, requirement]) != 0 or not list(folder.glob(pattern)):
-            raise BuildError(
-                f"There is no wheel of {requirement} for {blender_platform} and Python {python} "
-                "where pip looks. Check the network connection, or choose other platforms or "
-                "Pythons (--platform, --python)"
-            )
+        folder.mkdir(parents=True, exist_ok=True)
+        # Other processes may be looking for the same wheel, and must not find a part of it.
+        with tempfile.TemporaryDirectory(dir=folder) as temporary:
+            command = [str(VENV_PYTHON), "-m", "pip", "download", "--quiet", "--no-deps"]
+            command += ["--only-binary=:all:", "--python-version", python, "--dest", temporary]
+            for tag in PLATFORMS[blender_platform]:
+                command += ["--platform", tag]
+            downloaded = run([*command, requirement]) == 0 and list(Path(temporary).glob(pattern))
+            if not downloaded:
+                raise BuildError(
+                    f"There is no wheel of {requirement} for {blender_platform} and Python "
+                    f"{python} where pip looks. Check the network connection, or choose other "
+                    "platforms or Pythons (--platform, --python)"
+                )
+            os.replace(downloaded[0], folder / downloaded[0].name)
     return next(folder.glob(pattern))
 
 
-def kernel_wheel(name: str) -> Path:
-    """The wheel of the compiled kernels for a platform, built anew; it serves every Python."""
-    folder = DIST / "wheels" / f"{name}-kernels"
-    shutil.rmtree(folder, ignore_errors=True)
+def kernel_wheel(name: str, folder: Path) -> Path:
+    """Write the wheel of a platform's kernels, which serves every Python, to a folder."""
     say(f"Building the wheel of the kernels for {name}")
     command: list[str | Path] = [VENV_PYTHON, "-m", "pip", "wheel", "--quiet", "--no-deps"]
     command += ["--no-build-isolation", "--wheel-dir", folder, KERNELS]
     if run(command, {"NICMM_KERNELS_PLATFORM": name}) != 0:
         raise BuildError(f"The kernels could not be built for {name}; see the output above")
-    return next(folder.glob("nicmm_kernels-*.whl"))
+    return next(folder.glob(f"nicmm_kernels-*-{compile_library.PLATFORMS[name][1]}.whl"))
 
 
-def collect_wheels(blender_platform: str, pythons: Sequence[str]) -> list[Path]:
-    """The wheels that a zip contains, each once."""
+def collect_wheels(blender_platform: str, pythons: Sequence[str], folder: Path) -> list[Path]:
+    """The wheels that a zip contains, each once; those that are built are written to a folder."""
     requirements = [pinned(name) for name in BUNDLED]
     wheels = {}
     for python in pythons:
@@ -127,7 +131,7 @@ def collect_wheels(blender_platform: str, pythons: Sequence[str]) -> list[Path]:
         if not any(tag in wheel.name for wheel in found):
             raise BuildError(f"No wheel is built for Python {python} itself ({tag.strip('-')})")
         wheels.update({wheel.name: wheel for wheel in found})
-    kernels = kernel_wheel(blender_platform)
+    kernels = kernel_wheel(blender_platform, folder)
     wheels[kernels.name] = kernels
     return sorted(wheels.values(), key=lambda wheel: wheel.name)
 
@@ -151,13 +155,13 @@ def package(
 ) -> Path:
     """Build the zip of one platform, validate it with Blender's own tool, and return its path."""
     ensure_environment()
-    wheels = collect_wheels(blender_platform, pythons)
     tool, tags = blender_tool()
     facts = manifest()
     name = f"{facts['id']}-{facts['version']}-{blender_platform.replace('-', '_')}"
     archive = output / f"{name}.zip"
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
+        wheels = collect_wheels(blender_platform, pythons, Path(temporary) / "wheels")
         source = Path(temporary) / facts["id"]
         stage(source, wheels, blender_platform)
         for arguments in (

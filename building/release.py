@@ -133,7 +133,7 @@ def _wheels(folder: Path) -> str:
     if run([*pip, ROOT], environment) != 0:
         raise BuildError("the wheel of nicmm-curves could not be built")
     for platform in extension.KERNEL_PLATFORMS:
-        shutil.copy(extension.kernel_wheel(platform), folder)
+        extension.kernel_wheel(platform, folder)
     sources: list[str | Path] = [
         VENV_PYTHON,
         "-m",

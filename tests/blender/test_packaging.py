@@ -48,8 +48,8 @@ def test_kernels_are_compiled_by_the_pinned_compiler():
 
 
 @pytest.mark.slow
-def test_wheel_of_the_kernels_holds_one_library():
-    wheel = extension.kernel_wheel("linux-arm64")
+def test_wheel_of_the_kernels_holds_one_library(tmp_path):
+    wheel = extension.kernel_wheel("linux-arm64", tmp_path)
     assert wheel.name.endswith("-py3-none-manylinux_2_28_aarch64.whl")
     with zipfile.ZipFile(wheel) as opened:
         files = [name for name in opened.namelist() if ".dist-info/" not in name]
