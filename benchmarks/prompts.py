@@ -305,7 +305,7 @@ def section(results: Results) -> str:
     sheets = "\n\n".join(f"![Prompts](../docs/images/{name})" for name in results["sheets"])
     return (
         f"{len(answers)} prompts on generated bodies. All points of a prompt are clicked from one "
-        "view, which the pictures show; [docs/normal_bending.md](../docs/normal_bending.md) says "
+        "view, which the pictures show; [normal bending](../docs/normal_bending.md) says "
         "which curves look right. The table has the length of each curve in diagonals, L ∮ κ_g² ds "
         "and L ∮ κ_n² ds.\n\n"
         f"{report.table(header, rows)}\n\n{cost(results)}\n\n"

@@ -34,7 +34,7 @@ agrees with it.
 
 - **Methods.** `elastic`, the default of this package, searches for a course and relaxes it as an
   elastic curve; `nicmm` is the network of the paper, fitted to each curve; and `variational`
-  minimises the same energy as `nicmm` without a network ([docs/method.md](../docs/method.md)).
+  minimises the same energy as `nicmm` without a network ([the method](../docs/method.md)).
 - **Bending.** L ∮ κ_g² ds is the scale-free bending of a curve: its length times the integral of
   its squared geodesic curvature. A circle in the plane has 4π² ≈ 39; less is fairer.
 - **Times and losses** of the paper were measured on other hardware and with weights in other units,

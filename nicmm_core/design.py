@@ -636,9 +636,11 @@ def design_curve(
         The best of many candidate courses, or else the initial path, relaxed as an elastic curve
         (the default); the network of the paper, fitted to each curve; or the same energy as for
         "nicmm", minimised without a network.
-    obstacles, alignment : (V,) array_like of weights in [0, 1], optional
-        Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
-        a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.
+    obstacles : (V,) array_like of weights in [0, 1], optional
+        Weights of the vertices that the curve avoids. It never enters a face whose three corners
+        have weight 1; smaller weights only add to the energy.
+    alignment : (V,) array_like of weights in [0, 1], optional
+        Weights of the vertices that the curve follows.
     clearance : float, default 0
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1
         and from the curves of `avoid`.

@@ -24,6 +24,8 @@ from nicmm_core.paper.weights_file import load_network
 from nicmm_core.paper.zero_set import zero_set
 from nicmm_core.status import Status
 
+pytestmark = pytest.mark.slow
+
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
 NEVER = {"fluctuation": -1.0, "threshold": -1.0}
@@ -55,7 +57,6 @@ def run(network, problem, watch=None, weights=WEIGHTS, **settings):
     return fit_by_adamw(network, problem, weights, AdamWConfig(**settings), watch)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [1, 2, 20])
 def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     start = run(network, problem, iterations=1)
@@ -64,7 +65,6 @@ def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     assert loss_of(problem, result.field) <= loss_of(problem, start.field) * (1 + 1e-6)
 
 
-@pytest.mark.slow
 def test_iterations_lower_the_loss_of_an_untrained_network(problem):
     untrained = initial_network(NetworkConfig(width=16, depth=1))
     result = run(untrained, problem, iterations=40, **NEVER)
@@ -88,7 +88,6 @@ def test_topology_of_a_wrong_field_is_repaired_and_counted(ball, problem):
     assert is_one_curve(zero_set(ball, problem, result.field))
 
 
-@pytest.mark.slow
 def test_stops_when_the_energy_has_been_still_for_the_patience(network, problem):
     """With a fluctuation that every energy satisfies, it stops at the first opportunity."""
     for patience, least, expected in ((3, 1, 3), (7, 1, 7), (3, 12, 12)):
@@ -141,7 +140,6 @@ def test_network_given_is_not_changed(network, problem):
         np.testing.assert_array_equal(value, before[name])
 
 
-@pytest.mark.slow
 def test_repetition_gives_identical_numbers(network, problem):
     first, second = (run(network, problem, iterations=15) for _ in range(2))
     np.testing.assert_array_equal(first.field, second.field)

@@ -181,6 +181,7 @@ def test_only_those_above_are_avoided(empty_scene, pair):
 
 
 class TestOrder:
+    @pytest.mark.slow
     def test_new_curves_come_last(self, empty_scene, sphere):
         for name, height in (("Zebra", 0.0), ("Ant", 0.3), ("Mole", 0.6)):
             draw(sphere, around(height), name)
@@ -203,6 +204,7 @@ class TestOrder:
             assert moved == {"CANCELLED"}
         assert order(empty_scene, bpy.data.objects[sphere.name]) == ["A", "B", "C"]
 
+    @pytest.mark.slow
     def test_curves_of_equal_rank_are_ordered_by_name(self, empty_scene, sphere):
         for name, height in (("New", 0.0), ("Old B", 0.3), ("Old A", 0.6)):
             draw(sphere, around(height), name)
@@ -252,6 +254,7 @@ class TestOrder:
         state.use_filter_sort_alpha = True
         assert view.filter_items(state, bpy.context, bpy.data, "objects")[1] == []
 
+    @pytest.mark.slow
     def test_a_curve_keeps_its_place_when_edited_and_converted(self, empty_scene, sphere):
         for name, height in (("A", 0.0), ("B", 0.3), ("C", 0.6)):
             draw(sphere, around(height), name)
@@ -262,6 +265,7 @@ class TestOrder:
         assert order(empty_scene, sphere) == ["A", "B", "C"]
         assert bpy.data.objects["B"].type == "CURVES"
 
+    @pytest.mark.slow
     def test_a_curve_moved_above_is_free_and_the_other_gives_way(self, empty_scene, sphere):
         both = {"avoid_others": True, "clearance": CLEARANCE}
         draw(sphere, ring([0.0, 90.0, 270.0], [0.0, 0.0, 0.0]), "First", **both)
@@ -312,6 +316,7 @@ class TestFollowing:
         bpy.ops.ed.undo()
         np.testing.assert_array_equal(points_of(empty_scene, "Second"), before)
 
+    @pytest.mark.slow
     def test_a_changed_setting_takes_them_along(self, empty_scene, pair):
         before = points_of(empty_scene, "Second")
         bpy.data.objects["First"].nicmm_settings.smoothness = 0.1
@@ -322,6 +327,7 @@ class TestFollowing:
         assert len(points_of(empty_scene, "Second")) != len(before)
         assert_apart(empty_scene, pair, ["First", "Second"])
 
+    @pytest.mark.slow
     def test_edit_curve_takes_them_along(self, empty_scene, pair):
         points = [{"name": "", "position": place} for place in on(pair, around(0.03))]
         bpy.ops.nicmm.edit_curve("EXEC_DEFAULT", True, curve="First", points=points)
@@ -337,6 +343,7 @@ class TestFollowing:
         report = is_current(empty_scene, "Second"), is_current(empty_scene, "Side")
         assert any(report)  # points of the other may be cut off by this course
 
+    @pytest.mark.slow
     def test_a_curve_that_loses_its_points_is_avoided_no_more(self, empty_scene, pair):
         for _ in range(3):
             call("remove_point", curve="First", index=0)
@@ -353,6 +360,7 @@ class TestFollowing:
         assert is_current(empty_scene, "Second")
         assert len(points_of(empty_scene, "Second")) != len(before)
 
+    @pytest.mark.slow
     def test_one_that_cannot_follow_keeps_its_shape_and_says_why(self, empty_scene, pair, capfd):
         before = points_of(empty_scene, "Second")
         raise_first(pair, 0.25, 1)  # beyond a point of the second curve
@@ -364,6 +372,7 @@ class TestFollowing:
         raise_first(pair, 0.0, 1)
         assert is_current(empty_scene, "Second")
 
+    @pytest.mark.slow
     def test_the_panel_says_why_one_cannot_follow_a_setting(self, empty_scene, pair):
         second = bpy.data.objects["Second"]
         scenes.activate(second)
@@ -393,6 +402,7 @@ class TestFollowing:
         bpy.ops.nicmm.update_curves("EXEC_DEFAULT", True, curve="First")
         assert is_current(empty_scene, "First") and is_current(empty_scene, "Second")
 
+    @pytest.mark.slow
     def test_an_update_goes_in_the_order_of_the_list(self, empty_scene, sphere):
         """The second one is called before the first by name, and sees the new first one."""
         draw(sphere, around(0.0), "Zebra")
@@ -450,6 +460,7 @@ class TestInTheWindow:
         assert operator.answer(context, operator.requests(context)) == {"RUNNING_MODAL"}
         return window
 
+    @pytest.mark.slow
     def test_the_others_follow_in_time_slices(self, empty_scene, pair, moving):
         before = {name: points_of(empty_scene, name) for name in ("First", "Second")}
         assert moving.finish() == {"RUNNING_MODAL"}  # now the second curve
@@ -468,6 +479,7 @@ class TestInTheWindow:
         for name, points in before.items():
             np.testing.assert_array_equal(points_of(empty_scene, name), points)
 
+    @pytest.mark.slow
     def test_escape_leaves_what_has_not_followed(self, empty_scene, pair, moving):
         """The operator ends with an undo step, since the first curve has changed."""
         before = {name: points_of(empty_scene, name) for name in ("First", "Second")}
@@ -504,6 +516,7 @@ class TestLive:
         assert_apart(empty_scene, pair, ["First", "Second"])
         assert not live.messages(pair)
 
+    @pytest.mark.slow
     def test_a_deleted_curve_is_noticed(self, empty_scene, pair, live):
         before = points_of(empty_scene, "Second")
         scenes.activate(bpy.data.objects["First"])
@@ -512,6 +525,7 @@ class TestLive:
         assert is_current(empty_scene, "Second")
         assert len(points_of(empty_scene, "Second")) != len(before)
 
+    @pytest.mark.slow
     def test_what_could_not_follow_is_tried_again(self, empty_scene, pair, live):
         raise_first(pair, 0.25, 1)
         run_timer(live)
@@ -524,6 +538,7 @@ class TestLive:
         assert not live.messages(pair)
         assert is_current(empty_scene, "Second")
 
+    @pytest.mark.slow
     def test_nothing_to_do_after_an_edit(self, empty_scene, pair, live):
         raise_first(pair)
         before = points_of(empty_scene, "Second")
@@ -545,6 +560,7 @@ class TestRecords:
         raise_first(bpy.data.objects[mesh_name])
         assert is_current(empty_scene, "Second")
 
+    @pytest.mark.slow
     def test_a_duplicate_of_the_curve_above_is_avoided_too(self, empty_scene, pair):
         scenes.activate(bpy.data.objects["First"])
         bpy.ops.object.duplicate()
@@ -564,6 +580,7 @@ class TestRecords:
         bpy.ops.nicmm.convert_curve(output="STICKY", keep_original=True)
         assert is_current(empty_scene, order(empty_scene, pair)[-1])
 
+    @pytest.mark.slow
     def test_the_name_of_the_curve_above_does_not_matter(self, empty_scene, pair):
         bpy.data.objects["First"].name = "Renamed"
         assert is_current(empty_scene, "Second")
@@ -577,6 +594,7 @@ class TestRecords:
         assert len(order(empty_scene, pair)) == 2
         assert "its rank is" in refusal("remove_point", curve="Second", index=0)
 
+    @pytest.mark.slow
     def test_a_damaged_curve_above_is_named(self, empty_scene, pair, capfd):
         before = points_of(empty_scene, "Second")
         bpy.data.objects["First"]["nicmm_curve"]["barycentric"] = [1.0]
@@ -624,6 +642,7 @@ class TestMessages:
         scenes.activate(wanted.objects[1])
         assert "is linked from" in refusal("move_curve", curve="Second", direction="UP")
 
+    @pytest.mark.slow
     def test_other_methods_avoid_nothing(self, empty_scene, sphere):
         draw(sphere, around(0.0), "First")
         scenes.activate(sphere)
@@ -645,6 +664,7 @@ class TestMessages:
         assert [each.avoid_others for each in settings] == [True] + [False] * (len(names) - 2)
         assert all(is_current(empty_scene, name) for name in names)
 
+    @pytest.mark.slow
     def test_design_curve_avoids(self, empty_scene, sphere):
         draw(sphere, around(0.0), "First")
         scenes.activate(sphere)
@@ -654,6 +674,7 @@ class TestMessages:
         assert is_current(empty_scene, bpy.context.active_object.name)
 
 
+@pytest.mark.slow
 def test_a_draft_above_is_not_avoided(empty_scene, sphere):
     scenes.activate(sphere)
     call("add_point", position=on(sphere, around(0.0))[0])

@@ -240,6 +240,7 @@ class TestRefusals:
         curve.nicmm_settings.smoothness = 0.5
         assert curve.nicmm_settings.smoothness == 0.5
 
+    @pytest.mark.slow
     def test_a_map_that_no_longer_exists_can_be_cleared(self, empty_scene):
         ball = scenes.sphere()
         group = ball.vertex_groups.new(name="Wall")

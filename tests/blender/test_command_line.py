@@ -62,6 +62,7 @@ def test_group_points_and_places_give_the_same(command, file, tmp_path, extensio
     assert path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_settings_are_those_of_the_operator(command, file, tmp_path):
     path, _vertices, _mesh = file
     out = tmp_path / "out.blend"

@@ -197,6 +197,7 @@ def test_other_methods_have_no_corners(plane):
     assert 'needs the method "elastic"' in message
 
 
+@pytest.mark.slow
 def test_other_courses_have_the_same_corners(empty_scene):
     bpy.ops.mesh.primitive_torus_add(major_segments=24, minor_segments=12)
     places = [(1.25, 0.0, 0.0), (0.0, 1.25, 0.0), (-1.25, 0.0, 0.0)]
@@ -252,6 +253,7 @@ def test_in_modes_of_painting(square, plane, mode):
     assert corners(square) == [0, 1, 1, 1]
 
 
+@pytest.mark.slow
 def test_points_keep_their_corners(square):
     call("toggle_corner", index=3)
     assert corners(square) == [1, 1, 1, 0]
@@ -293,6 +295,7 @@ def test_updates_keep_corners(square, plane):
     np.testing.assert_allclose(points[:, 2], 0.1 * points[:, 0], atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_another_method_forgets_corners(square, plane):
     bpy.context.scene.nicmm_curves.method = "VARIATIONAL"
     assert bpy.ops.nicmm.update_curves(curve=square.name, use_panel=True) == {"FINISHED"}
@@ -340,6 +343,7 @@ def as_points(places):
     return [{"name": "", "position": tuple(place)} for place in places]
 
 
+@pytest.mark.slow
 def test_edit_curve(plane):
     assert bpy.ops.nicmm.edit_curve(points=as_points(SQUARE), corners="0, 2") == {"FINISHED"}
     curve = bpy.context.active_object

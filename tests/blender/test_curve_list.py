@@ -120,6 +120,7 @@ def test_settings_of_the_panel(sphere):
     assert not curve.data.splines[0].use_cyclic_u
 
 
+@pytest.mark.slow
 def test_vertices_that_are_new_do_not_matter(sphere, capfd):
     curve = draw(sphere)
     controls = scenes.positions(sphere)[list(VERTICES)]
@@ -132,6 +133,7 @@ def test_vertices_that_are_new_do_not_matter(sphere, capfd):
     assert "moved to the nearest positions" in capfd.readouterr().out
 
 
+@pytest.mark.slow
 def test_one_of_several_fails(sphere, capfd):
     good = draw(sphere)
     group = sphere.vertex_groups.new(name="Wall")
@@ -180,6 +182,7 @@ def test_update_says_what_is_missing(sphere):
     assert "is not in this scene" in refusal(curve=curve.name)
 
 
+@pytest.mark.slow
 def test_update_is_one_undo_step(sphere):
     curve = draw(sphere)
     name, before = curve.name, places(curve)
@@ -191,6 +194,7 @@ def test_update_is_one_undo_step(sphere):
     np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["CURVE", "STICKY"])
 def test_update_in_edit_mode_is_one_undo_step(sphere, kind):
     curve = draw(sphere, output=kind)
@@ -440,6 +444,7 @@ def test_change_during_work_starts_it_again(live, sphere):
     assert_same_curve(places(curve), places(expected))
 
 
+@pytest.mark.slow
 def test_what_cannot_be_updated_is_said_once(live, sphere):
     wall = sphere.vertex_groups.new(name="Wall")
     curve = draw(sphere, obstacle_group="Wall")

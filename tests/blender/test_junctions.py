@@ -114,6 +114,7 @@ def test_a_point_on_a_curve_is_recorded(empty_scene, tee):
     assert_meets_only_there(empty_scene, tee, position)
 
 
+@pytest.mark.slow
 def test_the_end_of_a_tee_follows_its_place(empty_scene, tee):
     before = assert_on(empty_scene, "Second", 0)
     ((_, _, leg, share),) = junctions("Second")
@@ -130,6 +131,7 @@ def test_the_end_of_a_tee_follows_its_place(empty_scene, tee):
     np.testing.assert_array_equal(assert_on(empty_scene, "Second", 0), after)
 
 
+@pytest.mark.slow
 def test_a_crossing_follows_too(empty_scene, cross):
     before = assert_on(empty_scene, "Second", 1)
     heights = points_of(empty_scene, "Second")[:, 2]
@@ -145,6 +147,7 @@ def test_without_that_point_the_curves_separate_the_ends(empty_scene, cross):
     assert "the curves above it in the list, with their clearance, separate" in message.lower()
 
 
+@pytest.mark.slow
 def test_a_junction_on_a_control_point_stays_there(empty_scene, first):
     place = controls(bpy.data.objects["First"])[2].astype(np.float32).tolist()
     end = on(first, ring([150.0], [0.7]))[0]
@@ -155,6 +158,7 @@ def test_a_junction_on_a_control_point_stays_there(empty_scene, first):
     np.testing.assert_allclose(second[0], first[2], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_other_numbers_of_points_keep_the_place(empty_scene, tee):
     before = assert_on(empty_scene, "Second", 0)
     between = place_on(empty_scene, "First", 0, 0.5)
@@ -167,6 +171,7 @@ def test_other_numbers_of_points_keep_the_place(empty_scene, tee):
     assert np.linalg.norm(assert_on(empty_scene, "Second", 0) - before) < 0.02
 
 
+@pytest.mark.slow
 def test_a_point_moved_away_is_no_junction_any_more(empty_scene, tee):
     call("move_point", curve="Second", index=0, position=on(tee, ring([126.0], [0.3]))[0])
     assert junctions("Second") == []
@@ -177,6 +182,7 @@ def test_a_point_moved_away_is_no_junction_any_more(empty_scene, tee):
     assert len(junctions("Second")) == 1
 
 
+@pytest.mark.slow
 def test_points_are_added_and_inserted_on_curves(empty_scene, first):
     panel = bpy.context.scene.nicmm_curves
     panel.closed, panel.avoid_others, panel.clearance = False, True, CLEARANCE
@@ -194,6 +200,7 @@ def test_points_are_added_and_inserted_on_curves(empty_scene, first):
     assert [each[0] for each in junctions("Second")] == [1, 3]
 
 
+@pytest.mark.slow
 def test_design_curve_makes_junctions(empty_scene, first):
     scenes.activate(first)
     places = [place_on(empty_scene, "First"), on(first, ring([150.0], [0.7]))[0]]
@@ -222,6 +229,7 @@ def test_the_setting_finds_points_on_curves(empty_scene, first):
     assert_on(empty_scene, "Second", 0)
 
 
+@pytest.mark.slow
 def test_a_point_on_two_curves_follows(empty_scene, cross):
     """The third one begins at the crossing of the other two."""
     place = controls(bpy.data.objects["Second"])[1].astype(np.float32).tolist()
@@ -234,6 +242,7 @@ def test_a_point_on_two_curves_follows(empty_scene, cross):
     assert_on(empty_scene, "Third", 0, "Second")
 
 
+@pytest.mark.slow
 def test_a_chain_of_junctions_follows(empty_scene, tee):
     end = on(tee, ring([100.0], [0.5]))[0]
     place = place_on(empty_scene, "Second", 0, 0.5)
@@ -251,6 +260,7 @@ class TestOtherCurve:
         call("move_point", curve="Renamed", index=2, position=on(tee, around(0.1))[2])
         assert_on(empty_scene, "Second", 0, "Renamed")
 
+    @pytest.mark.slow
     def test_duplicated(self, empty_scene, tee):
         scenes.activate(bpy.data.objects["First"])
         bpy.ops.object.duplicate()
@@ -292,6 +302,7 @@ class TestOtherCurve:
         call("move_curve", curve="First", direction="UP")
         assert len(junctions("Second")) == 1
 
+    @pytest.mark.slow
     def test_without_a_curve(self, empty_scene, tee):
         for _ in range(3):
             call("remove_point", curve="First", index=0)
@@ -313,6 +324,7 @@ class TestOtherCurve:
         assert_on(empty_scene, "Second", 0)
 
 
+@pytest.mark.slow
 def test_live_takes_junctions_along(empty_scene, tee):
     bpy.context.scene.nicmm_live_update = True
     live = module(empty_scene, "operators.live_update")

@@ -158,6 +158,7 @@ def test_a_map_that_the_curve_cannot_use_is_reported(empty_scene, capfd):
     assert f'"{curve.name}" does not use it' in capfd.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_map_of_a_curve_without_a_parent_is_on_its_mesh(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))

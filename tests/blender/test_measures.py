@@ -19,6 +19,7 @@ def equator(empty_scene):
     return bpy.context.active_object
 
 
+@pytest.mark.slow
 def test_measures_are_in_scene_units(extension, equator):
     measures = scenes.module(extension, "operators.measures")
     [found] = measures.now(equator).values
@@ -32,6 +33,7 @@ def test_measures_are_in_scene_units(extension, equator):
     assert larger["area"] == pytest.approx(9.0 * found["area"], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_slopes_are_those_in_the_scene(extension, equator):
     measures = scenes.module(extension, "operators.measures")
     assert measures.now(equator).values[0]["greatest_slope"] < 0.1
@@ -40,6 +42,7 @@ def test_slopes_are_those_in_the_scene(extension, equator):
     assert measures.now(equator).values[0]["greatest_slope"] > 1.4
 
 
+@pytest.mark.slow
 def test_measures_are_computed_again_only_after_changes(extension, equator):
     measures = scenes.module(extension, "operators.measures")
     first = measures.now(equator)
@@ -51,6 +54,7 @@ def test_measures_are_computed_again_only_after_changes(extension, equator):
     assert measures.now(equator).values[0]["length"] > first.values[0]["length"]
 
 
+@pytest.mark.slow
 def test_the_comb_of_a_circle_points_outwards(extension, empty_scene):
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=2.0)
     angles = 2.0 * np.pi * np.arange(6) / 6.0

@@ -32,6 +32,7 @@ def reported_error(**arguments):
     return str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 def test_equals_the_core(empty_scene, mode):
     sphere = scenes.sphere()
@@ -77,6 +78,7 @@ def test_alternatives_of_outputs_that_change_the_mesh_are_refused(empty_scene):
         assert "Alternatives" in reported_error(alternatives=1, output=output)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "arguments"),
     [
@@ -227,6 +229,7 @@ def test_undo_takes_the_curve_away(empty_scene, mode):
     assert len(scenes.curves()) == 1
 
 
+@pytest.mark.slow
 def test_lengths_are_those_of_the_scaled_object(empty_scene):
     sphere = scenes.sphere()
     sphere.scale = (1, 1, 3)
@@ -269,6 +272,7 @@ def test_quads_are_cut_into_triangles(empty_scene):
     assert scenes.distances_to(scenes.positions(torus)[patch], points).max() < ROUNDING
 
 
+@pytest.mark.slow
 def test_unfinished_editing_is_used(empty_scene):
     sphere = scenes.sphere()
     vertices = scenes.ring(sphere, 4)
@@ -313,6 +317,7 @@ def test_missing_group_is_named(empty_scene, field):
     assert 'Choose one of "Walls"' in reported_error(**{field: "Wall"})
 
 
+@pytest.mark.slow
 def test_repairs_are_reported_and_keep_the_curve(empty_scene, capfd):
     """Half of the faces are turned over."""
     sphere = scenes.sphere()
@@ -452,6 +457,7 @@ def test_selections_on_other_meshes_are_mentioned(empty_scene, capfd):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
+@pytest.mark.slow
 def test_alternatives_have_no_effect_with_other_methods(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))

@@ -120,10 +120,12 @@ def test_help_without_arguments():
         assert command in ran.stdout
 
 
+@pytest.mark.slow
 def test_zip_passes_our_review(archive):
     assert reviewed.faults(archive) == []
 
 
+@pytest.mark.slow
 def test_review_finds_what_platforms_refuse(archive, tmp_path):
     bad = tmp_path / "bad.zip"
     with zipfile.ZipFile(archive) as old, zipfile.ZipFile(bad, "w") as new:

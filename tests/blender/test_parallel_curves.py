@@ -33,6 +33,7 @@ def add(**settings):
     return bpy.context.active_object
 
 
+@pytest.mark.slow
 def test_parallel_curves_are_at_their_distances_and_the_curve_is_kept(equator):
     parallel = add(parallel_count=2, both_sides=True)
     assert equator.name in bpy.data.objects and parallel is not equator
@@ -49,6 +50,7 @@ def test_a_positive_distance_is_on_the_left_side(equator):
     assert np.sign(latitudes(parallel).mean()) == np.sign(area)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spline", ["EVEN", "EXACT", "BEZIER"])
 def test_every_kind_of_spline(equator, spline):
     parallel = add()
@@ -58,6 +60,7 @@ def test_every_kind_of_spline(equator, spline):
     assert parallel.data.splines[0].type == kind
 
 
+@pytest.mark.slow
 def test_a_changed_setting_computes_the_curves_again(equator):
     parallel = add()
     parallel.nicmm_parallel.distance = -0.3
@@ -68,6 +71,7 @@ def test_a_changed_setting_computes_the_curves_again(equator):
     assert len(parallel.data.splines) == 6
 
 
+@pytest.mark.slow
 def test_a_distance_that_is_too_great_keeps_the_shape_and_says_so(equator):
     parallel = add()
     before = scenes.points(parallel)
@@ -78,6 +82,7 @@ def test_a_distance_that_is_too_great_keeps_the_shape_and_says_so(equator):
     assert not parallel.nicmm_parallel.problem
 
 
+@pytest.mark.slow
 def test_parallel_curves_follow_the_curve(equator):
     parallel = add()
     before = scenes.points(parallel)
@@ -95,6 +100,7 @@ def test_parallel_curves_follow_the_curve(equator):
     assert 0.9 * DISTANCE < away.min() and away.max() < 1.05 * DISTANCE
 
 
+@pytest.mark.slow
 def test_parallel_curves_follow_the_mesh_when_curves_are_updated(equator):
     parallel = add()
     ball = parallel.parent
@@ -122,6 +128,7 @@ def test_without_its_curve_the_parallel_curves_stay(equator):
     assert "was deleted" in parallel.nicmm_parallel.problem
 
 
+@pytest.mark.slow
 def test_a_new_curve_can_have_parallel_curves_at_once(empty_scene):
     ball = scenes.sphere(4)
     scenes.select(ball, scenes.ring(ball, 6))
@@ -142,6 +149,7 @@ def test_undo_takes_the_parallel_curves_back(equator):
     assert len(scenes.curves()) == 1
 
 
+@pytest.mark.slow
 def test_no_place_so_far_away_is_an_error(equator):
     with pytest.raises(RuntimeError, match="smaller Distance"):
         bpy.ops.nicmm.convert_curve(output="PARALLEL", parallel_distance=5.0)

@@ -106,6 +106,7 @@ def test_each_point_is_one_undo_step(sphere, places, mode, output):
         assert content() == expected
 
 
+@pytest.mark.slow
 def test_a_curve_grows_with_its_points(empty_scene, sphere, places):
     counts = []
     for place in places[:4]:
@@ -198,6 +199,7 @@ def test_points_on_another_part_are_refused(empty_scene, sphere, places):
     assert content() == before
 
 
+@pytest.mark.slow
 def test_drafts_are_explained(sphere, places):
     """A curve with one point: operators that need more points say so, and it can be continued."""
     call("add_point", position=places[0])
@@ -262,6 +264,7 @@ def test_the_radius_of_a_draft_is_kept(sphere, places):
     assert curve.nicmm_settings.radius == pytest.approx(0.0625)
 
 
+@pytest.mark.slow
 def test_an_impossible_setting_is_explained(empty_scene, curve, sphere):
     wall = sphere.vertex_groups.new(name="Wall")
     heights = scenes.positions(sphere)[:, 2]

@@ -356,6 +356,7 @@ def test_a_curve_on_the_cage_moves_to_the_shown_surface(monkey):
     assert scenes.distances_to(vertices[list(CHOSEN)], in_world(curve)).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disable", ["object", "collection"])
 def test_a_mesh_disabled_in_viewports_is_not_read_without_its_modifiers(monkey, disable):
     subdivision(monkey)

@@ -32,6 +32,7 @@ def control_points(extension, curve):
     return surface.points(points.faces, points.barycentric)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_stroke_becomes_a_curve_with_few_points(extension, ball, closed):
     angles = np.linspace(0.0, 6.2 if closed else 3.0, 200)
@@ -45,6 +46,7 @@ def test_a_stroke_becomes_a_curve_with_few_points(extension, ball, closed):
     assert 3 <= len(control_points(extension, curve)) <= 20
 
 
+@pytest.mark.slow
 def test_a_stroke_redraws_a_stretch_and_nothing_else(extension, ball):
     vertices = scenes.ring(ball, 8)
     scenes.select(ball, vertices)
@@ -72,6 +74,7 @@ def test_a_stroke_off_the_surface_is_an_error(ball):
     assert not scenes.curves()
 
 
+@pytest.mark.slow
 def test_a_curve_along_the_edge_of_a_cylinder(extension, empty_scene):
     bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=1.0, depth=1.0)
     body = bpy.context.active_object
@@ -84,6 +87,7 @@ def test_a_curve_along_the_edge_of_a_cylinder(extension, empty_scene):
     assert len(control_points(extension, curve)) < 30
 
 
+@pytest.mark.slow
 def test_a_curve_along_the_rim_of_a_map(empty_scene):
     ball = scenes.sphere(5)
     group = ball.vertex_groups.new(name="Cap")

@@ -95,6 +95,7 @@ def test_all_curves_of_a_pair_are_avoided(empty_scene, sphere, side):
     assert is_current(empty_scene, "Second")
 
 
+@pytest.mark.slow
 def test_a_joined_curve_is_avoided(empty_scene, sphere):
     draw(sphere, [(0.3, -0.9, 0.0), (0.9, 0.0, 0.1), (0.3, 0.9, 0.0)], "First", "JOINED")
     draw(
@@ -117,6 +118,7 @@ def test_a_joined_curve_cannot_avoid_others(sphere):
     assert not scenes.curves()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mirror", "avoids", "name", "value"),
     [("JOINED", False, "avoid_others", True), ("PAIR", True, "mirror_as", "JOINED")],
@@ -132,6 +134,7 @@ def test_the_settings_do_not_change_to_both(empty_scene, sphere, mirror, avoids,
         np.testing.assert_array_equal(points, curve.points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["PAIR", "JOINED"])
 def test_a_pair_avoids_symmetric_curves(sphere, how):
     """The mirror image of what avoids a symmetric curve avoids it, too."""
@@ -144,6 +147,7 @@ def test_a_pair_avoids_symmetric_curves(sphere, how):
     assert_apart(sphere, "Second", "First")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("clearance", "height", "reason"),
     [(0.0, 0.0, "crosses"), (0.1, 0.0, "crosses"), (0.1, 0.08, "comes closer to")],
@@ -159,6 +163,7 @@ def test_the_mirror_image_may_not_meet_another_curve(sphere, clearance, height, 
     assert len(scenes.curves()) == 1
 
 
+@pytest.mark.slow
 def test_a_pair_whose_image_would_meet_another_curve_keeps_its_shape(sphere):
     draw(sphere, [(-0.8, -0.3, -0.1), (-0.8, 0.3, -0.1)], "First", closed=False)
     draw(sphere, ALONE, "Second", "PAIR", **AVOIDING)
@@ -173,6 +178,7 @@ def test_a_pair_whose_image_would_meet_another_curve_keeps_its_shape(sphere):
 # Junctions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0, 1])
 def test_a_junction_follows_a_curve_of_a_pair(empty_scene, sphere, part):
     draw(sphere, SIDE, "First", "PAIR")
@@ -197,6 +203,7 @@ def test_a_junction_follows_a_curve_of_a_pair(empty_scene, sphere, part):
     assert is_current(empty_scene, "Second")
 
 
+@pytest.mark.slow
 def test_a_pair_may_end_on_a_pair(sphere):
     """The mirror image of a junction is a junction of the mirror images."""
     draw(sphere, SIDE, "First", "PAIR")
@@ -209,6 +216,7 @@ def test_a_pair_may_end_on_a_pair(sphere):
         np.testing.assert_allclose(end[0], other.points[other.control_index[1]], atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_marks_of_the_tool(empty_scene, sphere):
     """A diamond, as a corner a star, and a hollow square for its image."""
     overlay = module(empty_scene, "tool.overlay")

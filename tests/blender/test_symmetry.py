@@ -157,6 +157,7 @@ def test_joined(sphere, spline):
     assert list(curve["nicmm_curve"]["control_counts"]) == [6]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spline", ["EVEN", "EXACT", "BEZIER"])
 def test_pair(sphere, spline):
     curve = draw(sphere, spline=spline, mirror_as="PAIR")
@@ -168,6 +169,7 @@ def test_pair(sphere, spline):
     assert list(curve["nicmm_curve"]["control_counts"]) == [3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 0.7, 1.3)])
@@ -182,6 +184,7 @@ def test_planes_of_a_rotated_and_scaled_object(sphere, how, axis, scale):
     assert passes(curve, [*places, *flipped(places, axis)]) < ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on_plane", [(), (0,), (2,), (0, 2)])
 def test_corners_and_points_on_the_plane(sphere, on_plane):
     """Which points have images decides which of them are sharp."""
@@ -199,6 +202,7 @@ def test_corners_and_points_on_the_plane(sphere, on_plane):
     assert asymmetry(curve) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_corners_of_a_pair(sphere):
     curve = draw(sphere, corners="1", spline="BEZIER", mirror_as="PAIR")
     kinds = [
@@ -236,6 +240,7 @@ def test_alternatives_are_symmetric(empty_scene, how):
         assert asymmetry(curve) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_other_methods_have_no_mirror(sphere):
     curve = draw(sphere, method="VARIATIONAL")
     asked = curve["nicmm_curve"]["asked"]
@@ -258,6 +263,7 @@ def half(empty_scene):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 def test_the_modifier_has_the_plane(half, how):
     curve = draw(half, mirror_axis="MODIFIER", mirror_as=how)
@@ -265,6 +271,7 @@ def test_the_modifier_has_the_plane(half, how):
     assert passes(curve, flipped(on(half, THREE))) < ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_the_modifier_has_a_mirror_object(half, axis):
     """The plane is that of the other object; it need not pass through the origin of the mesh."""
@@ -316,6 +323,7 @@ def test_the_cage_has_no_other_half(half):
 # Editing.
 
 
+@pytest.mark.slow
 def test_points_and_images_move_together(joined, sphere):
     place = on(sphere, [(0.5, -0.8, 0.3)])
     call("move_point", index=1, position=place[0])
@@ -327,6 +335,7 @@ def test_points_and_images_move_together(joined, sphere):
     assert asymmetry(joined) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_points_of_a_pair_move_with_their_images(pair, sphere):
     place = on(sphere, [(0.9, -0.3, 0.2)])
     call("move_point", index=1, position=flipped(place)[0].tolist(), image=True)
@@ -342,6 +351,7 @@ def test_points_of_a_pair_move_with_their_images(pair, sphere):
     assert asymmetry(pair) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_points_of_the_other_side_are_mirrored(joined, sphere):
     place = on(sphere, [(-0.2, -0.7, -0.8)])
     call("add_point", position=place[0])
@@ -351,6 +361,7 @@ def test_points_of_the_other_side_are_mirrored(joined, sphere):
     assert asymmetry(joined) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_drawing_point_by_point(sphere):
     """One point and its image are an open curve, two points and theirs a closed one."""
     bpy.context.scene.nicmm_curves.mirror_axis = "X"
@@ -395,6 +406,7 @@ def test_points_on_the_plane(sphere, is_closed):
     assert asymmetry(curve) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_each_change_is_one_undo_step(pair, sphere):
     states = [content()]
     for name, arguments in (
@@ -407,6 +419,7 @@ def test_each_change_is_one_undo_step(pair, sphere):
     undo_and_redo(states)
 
 
+@pytest.mark.slow
 def test_via_points(joined, sphere):
     """Also on the leg that crosses the plane, and given on the other side."""
     call("add_via_point", leg=0, position=on(sphere, [(-0.7, -0.7, 0.4)])[0])
@@ -438,6 +451,7 @@ def test_via_points_in_scripts(sphere):
 # Settings.
 
 
+@pytest.mark.slow
 def test_settings_take_effect_immediately(joined):
     values = joined.nicmm_settings
     assert (values.mirror_axis, values.mirror_as) == ("X", "JOINED")
@@ -456,6 +470,7 @@ def test_settings_take_effect_immediately(joined):
     assert asymmetry(joined) < SYMMETRIC
 
 
+@pytest.mark.slow
 def test_points_on_both_sides(sphere, empty_scene):
     curve = draw(sphere, [(0.5, -0.8, 0.4), (-0.6, -0.7, 0.0), (0.3, -0.8, -0.5)], mirror_as="PAIR")
     assert asymmetry(curve) < SYMMETRIC
@@ -466,6 +481,7 @@ def test_points_on_both_sides(sphere, empty_scene):
     assert "keep the points of one side" in problem
 
 
+@pytest.mark.slow
 def test_edit_curve_in_scripts(sphere):
     points = [{"name": "", "position": tuple(place)} for place in on(sphere, THREE)]
     call("edit_curve", points=points, mirror_axis="X", mirror_as="PAIR")
@@ -548,6 +564,7 @@ def test_a_pair_cannot_be_cut(sphere, pair):
     assert message in refusal("convert_curve", output="REGION")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 def test_conversions_keep_the_mirror(sphere, how):
     curve = draw(sphere, mirror_as=how, corners="1")
@@ -566,6 +583,7 @@ def test_conversions_keep_the_mirror(sphere, how):
 # Updates.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 def test_updates(sphere, how):
     curve = draw(sphere, mirror_as=how)
@@ -622,6 +640,7 @@ def test_live_follows_the_mirror_object(half, empty_scene):
 # Reports.
 
 
+@pytest.mark.slow
 def test_asymmetry_is_reported(sphere, empty_scene):
     """On a mesh that is only nearly symmetric."""
     generator = np.random.default_rng(0)
@@ -652,6 +671,7 @@ def test_asymmetry_is_reported(sphere, empty_scene):
 # Records.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["JOINED", "PAIR"])
 def test_files_keep_the_mirror(sphere, how, tmp_path):
     curve = draw(sphere, mirror_as=how)
@@ -729,6 +749,7 @@ def test_points_snap_to_the_plane(joined, empty_scene, pixels):
         assert found is place
 
 
+@pytest.mark.slow
 def test_which_points_may_be_on_the_plane(sphere, empty_scene):
     snap = module(empty_scene, "tool.mirror_snap")
     panel = bpy.context.scene.nicmm_curves

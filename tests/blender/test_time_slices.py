@@ -297,6 +297,7 @@ def drawing(empty_scene, no_patience):
     return window
 
 
+@pytest.mark.slow
 def test_a_curve_is_the_same_in_time_slices(drawing, empty_scene):
     operator, context = drawing.operator, drawing.context
     assert operator.answer(context, operator.requests(context)) == {"RUNNING_MODAL"}
@@ -310,6 +311,7 @@ def test_a_curve_is_the_same_in_time_slices(drawing, empty_scene):
     assert not drawing.timers and not vars(operator)
 
 
+@pytest.mark.slow
 def test_mesh_that_changes_meanwhile_is_reported(drawing):
     operator, context = drawing.operator, drawing.context
     operator.answer(context, operator.requests(context))
@@ -351,6 +353,7 @@ def following(empty_scene, no_patience, monkeypatch):
     return Window(Following)
 
 
+@pytest.mark.slow
 def test_a_stroke_is_fitted_in_time_slices(following, empty_scene):
     assert following.operator._begin(following.context) == {"RUNNING_MODAL"}
     assert following.finish() == {"RUNNING_MODAL"}  # now the curve

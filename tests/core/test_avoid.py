@@ -20,6 +20,8 @@ from tests.oracles.curve_pairs import contacts, least_distance
 from tests.oracles.named_curves import nearest_vertices
 from tests.oracles.same_surface import changed
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 CLEARANCE = 0.05
 LEAST, MOST = 1.0, 1.05
 """Bounds of the distance where a curve is pressed against another one, in clearances."""
@@ -86,6 +88,7 @@ def test_a_parallel_line_keeps_the_clearance_and_no_more(plate, line, clearance)
     assert LEAST * clearance <= distance <= MOST * clearance
 
 
+@pytest.mark.slow
 def test_without_clearance_it_only_does_not_cross(plate, line):
     points = flat((-0.6, 0.5), (-0.35, 0.03), (0.35, 0.03), (0.6, 0.5))
     design = nicmm.design_curve(plate, points, closed=False, avoid=[line.curves[0]])
@@ -103,6 +106,7 @@ def test_it_goes_round_the_end(plate, line):
     assert LEAST * CLEARANCE <= distance
 
 
+@pytest.mark.slow
 def test_distance_on_a_torus():
     """A curve around the tube is pushed towards another one by points on both sides."""
     mesh = shapes.torus(around=48, across=24)
@@ -175,6 +179,7 @@ class TestJunctions:
         assert_valid_design(plate, design, points, closed=closed)
         return design.curves[0]
 
+    @pytest.mark.slow
     def test_t(self, plate, line, clearance):
         end = on_curve(line.curves[0], 0.6)
         points = np.stack([[-0.3, 0.5, 0.0], [0.2, 0.3, 0.0], end])
@@ -188,6 +193,7 @@ class TestJunctions:
         curve = self.design(plate, line, np.stack([end, [0.5, 0.5, 0.0]]), clearance)
         assert contacts(plate, curve, line.curves[0], end[None]) == 0
 
+    @pytest.mark.slow
     def test_x(self, plate, line, clearance):
         middle = on_curve(line.curves[0], 0.4)
         points = np.stack([[-0.2, -0.5, 0.0], middle, [0.2, 0.5, 0.0]])
@@ -198,12 +204,14 @@ class TestJunctions:
         heights = curve.points[:, 1]
         assert np.count_nonzero(np.diff(np.sign(heights[np.abs(heights) > 1e-6]))) == 1
 
+    @pytest.mark.slow
     def test_a_closed_curve_passes_twice(self, plate, line, clearance):
         left, right = on_curve(line.curves[0], 0.2), on_curve(line.curves[0], 0.8)
         points = np.stack([left, [0.0, 0.4, 0.0], right, [0.0, -0.4, 0.0]])
         curve = self.design(plate, line, points, clearance, closed=True)
         assert contacts(plate, curve, line.curves[0], np.stack([left, right])) == 0
 
+    @pytest.mark.slow
     def test_three_curves_share_a_point(self, plate, line, clearance):
         shared = on_curve(line.curves[0], 0.5)
         first = self.design(plate, line, np.stack([[-0.4, 0.5, 0.0], shared]), clearance)
@@ -271,6 +279,7 @@ class TestArguments:
         np.testing.assert_array_equal(plain.points, empty.points)
 
 
+@pytest.mark.slow
 def test_with_obstacles(plate, line):
     """The clearance is kept from both."""
     obstacle = np.array([0.0, 0.35, 0.0])
@@ -302,6 +311,7 @@ def test_dragging_keeps_the_side(plate, line):
         designer.design(flat((-0.1, 0.5), (0.6, 0.5)), **given, start=crossing)
 
 
+@pytest.mark.slow
 def test_equal_arguments_give_equal_curves(plate, line):
     designer = nicmm.Designer(plate)
     points = flat((-0.6, 0.5), (-0.3, 0.07), (0.3, 0.07), (0.6, 0.5))
@@ -313,6 +323,7 @@ def test_equal_arguments_give_equal_curves(plate, line):
         np.testing.assert_array_equal(design.curves[0].points, first.curves[0].points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -418,6 +429,7 @@ class TestCheckAvoids:
         points = flat((start, -height), (0.3, -height))
         return nicmm.mirrored(plate, nicmm.design_curve(plate, points, closed=False), self.MIRROR)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.09), (0.1, 0.0), (0.02, 0.019)])
     def test_far_enough(self, plate, line, height, clearance):
         image = self.image(plate, height)
@@ -442,6 +454,7 @@ class TestCheckAvoids:
         ending = nicmm.design_curve(plate, points, closed=False)
         nicmm.Designer(plate).check_avoids(ending, [line], clearance)
 
+    @pytest.mark.slow
     def test_on_a_defective_mesh(self, plate):
         """The distance is measured on the repaired surface."""
         mesh = changed(plate, "soup", seed=1).mesh

@@ -24,6 +24,7 @@ def turns(curve):
     return np.arccos(cosine.clip(-1.0, 1.0))
 
 
+@pytest.mark.slow
 def test_indices_may_be_an_array():
     mesh = shapes.disc(12)
     by_list = nicmm.design_curve(mesh, SQUARE, corners=[1, 2])
@@ -45,6 +46,7 @@ def test_a_square_through_four_corners(factor):
     assert design.energy["smooth"] < 1e-3
 
 
+@pytest.mark.slow
 def test_only_corners_turn():
     """Between two corners, the curve through a third point is smooth there."""
     mesh = shapes.disc(30)
@@ -57,6 +59,7 @@ def test_only_corners_turn():
     assert design.energy["smooth"] < smooth.energy["smooth"]
 
 
+@pytest.mark.slow
 def test_an_open_curve_with_a_corner_consists_of_two_open_curves(body):
     """With a corner in the middle, each part has free ends as a curve of its own has."""
     points = np.array([3, 250, 399, 120, 333])
@@ -81,6 +84,7 @@ def test_corners_are_kept_in_any_order(body):
     np.testing.assert_allclose(curve.points[curve.control_index[place]], body.vertices[250])
 
 
+@pytest.mark.slow
 def test_a_corner_can_be_set_and_removed_from_a_start():
     mesh = shapes.disc(30)
     designer = nicmm.Designer(mesh)
@@ -95,6 +99,7 @@ def test_a_corner_can_be_set_and_removed_from_a_start():
     assert moved.energy["smooth"] < 1e-3
 
 
+@pytest.mark.slow
 def test_corners_on_a_large_mesh():
     """There courses are found on a coarse mesh."""
     mesh = shapes.sphere(6)
@@ -106,6 +111,7 @@ def test_corners_on_a_large_mesh():
     assert design.energy["smooth"] < 0.05  # four parts of great circles
 
 
+@pytest.mark.slow
 def test_the_energy_at_corners_is_that_of_the_formula(flat_disc):
     design = nicmm.design_curve(flat_disc, SQUARE, corners=[1, 3])
     nodes = design.resumable.curve.nodes

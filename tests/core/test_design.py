@@ -28,6 +28,8 @@ from tests.core.checks import (
 )
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 ROOT = Path(__file__).parents[2]
 CHOSEN = [3, 50, 200, 333]
 

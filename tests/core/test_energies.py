@@ -16,6 +16,7 @@ def test_every_request_has_a_kept_energy():
     assert len(REQUESTS) >= 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REQUESTS)
 def test_the_energy_does_not_rise(name):
     """After a change that lowers energies, run: python -m tests.oracles.energies."""

@@ -30,6 +30,7 @@ def test_more_attempts_do_not_raise_the_energy(monkeypatch, name):
     assert all_of_them <= one * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
     """Although the third is shorter than both."""
     points = [[3, 200, 400], [10, 300, 500, 610], [7, 8, 9]]
@@ -53,6 +54,7 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
     assert energies(3)[:2] == energies(2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smoothness", [1.0, 0.5])
 def test_alternatives_tell_their_energy_relative_to_the_fairest_curve(ball, smoothness):
     design = nicmm.design_curve(ball, [3, 200, 400, 611], alternatives=4, smoothness=smoothness)
@@ -66,6 +68,7 @@ def test_alternatives_tell_their_energy_relative_to_the_fairest_curve(ball, smoo
     np.testing.assert_allclose(relative, energies / energies[0], rtol=0.2)
 
 
+@pytest.mark.slow
 def test_relative_energies_are_at_least_one_with_maps(ball):
     lane = np.exp(-((ball.vertices[:, 2] / 0.1) ** 2))
     design = nicmm.design_curve(ball, [3, 200, 400, 611], alternatives=4, alignment=lane)
@@ -73,6 +76,7 @@ def test_relative_energies_are_at_least_one_with_maps(ball):
     assert len(relative) > 1 and relative[0] == 1.0 and relative == sorted(relative)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [8, 16])
 @pytest.mark.parametrize("closed", [False, True])
 def test_many_points_of_a_fair_curve_have_a_curve_as_fair(surface, closed, count):
@@ -86,6 +90,7 @@ def test_many_points_of_a_fair_curve_have_a_curve_as_fair(surface, closed, count
     assert found.energy["smooth"] <= 1.03 * known.energy["smooth"]
 
 
+@pytest.mark.slow
 def test_the_spline_through_many_points_is_tried(ball, monkeypatch):
     tried = []
     by_spline = start_search.StartSearch.by_spline

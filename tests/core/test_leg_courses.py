@@ -75,6 +75,7 @@ def test_only_one_leg_takes_other_courses(torus, designer, points, closed):
     assert found > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0.0, 0.8, 0.9])
 def test_a_cancelled_search_has_no_curve(designer, points, after):
     curve = designer.design(points).curves[0]
@@ -86,6 +87,7 @@ def test_a_cancelled_search_has_no_curve(designer, points, after):
     assert design.status is nicmm.Status.CANCELLED and not design.curves
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_replaced_leg_leaves_the_rest(torus, designer, points, closed):
     curve = designer.design(points, closed=closed).curves[0]

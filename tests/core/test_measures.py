@@ -27,6 +27,7 @@ def flat_circle(mesh, radius=0.5, count=12):
     return nicmm.design_curve(mesh, nearest_points(mesh, circle(angle, radius))[0]).curves[0]
 
 
+@pytest.mark.slow
 def test_a_spherical_cap_has_its_length_and_area():
     errors = []
     for subdivisions in (4, 5):
@@ -44,6 +45,7 @@ def test_a_spherical_cap_has_its_length_and_area():
     assert measures["greatest_slope"] < 0.01
 
 
+@pytest.mark.slow
 def test_a_disc_has_its_length_area_and_radius():
     mesh = shapes.disc(48)
     measures = flat_circle(mesh).measures(mesh)
@@ -53,6 +55,7 @@ def test_a_disc_has_its_length_area_and_radius():
     assert measures["greatest_slope"] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("subdivisions", [4, 5])
 def test_a_circle_of_latitude_has_its_geodesic_curvature(subdivisions):
     mesh = shapes.sphere(subdivisions)
@@ -74,6 +77,7 @@ def test_conormals_are_on_the_left_and_curvature_is_positive_there():
     assert (inwards > 0.0).all()
 
 
+@pytest.mark.slow
 def test_lengths_of_legs_add_up(body):
     for closed in (True, False):
         points = random_surface_points(body, 4, 3)
@@ -90,6 +94,7 @@ def test_an_open_curve_and_one_around_a_tube_enclose_no_area(ring):
     assert around.measures(ring)["area"] is None
 
 
+@pytest.mark.slow
 def test_measures_scale_with_the_mesh(ball):
     points = ball.vertices[[5, 200, 400, 600]]
     before = nicmm.design_curve(ball, points).curves[0].measures(ball)
@@ -99,6 +104,7 @@ def test_measures_scale_with_the_mesh(ball):
         assert after[name] == pytest.approx(100.0**power * before[name], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_measures_do_not_depend_on_shared_vertices(ball):
     points = ball.vertices[[5, 200, 400, 600]]
     before = nicmm.design_curve(ball, points).curves[0].measures(ball)
@@ -109,6 +115,7 @@ def test_measures_do_not_depend_on_shared_vertices(ball):
         assert after[name] == pytest.approx(before[name], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_distance_to_an_obstacle_is_that_along_the_surface():
     mesh = shapes.sphere(5)
     equator, found = parallel(mesh)
@@ -122,6 +129,7 @@ def test_the_distance_to_an_obstacle_is_that_along_the_surface():
     assert nothing["distance_to_obstacle"] is None
 
 
+@pytest.mark.slow
 def test_slopes_are_measured_from_the_plane_across_a_direction():
     mesh = shapes.sphere(5)
     _, found = parallel(mesh)
@@ -129,6 +137,7 @@ def test_slopes_are_measured_from_the_plane_across_a_direction():
     assert found.measures(mesh, up=(0.0, 0.0, -5.0))["greatest_slope"] < 0.01
 
 
+@pytest.mark.slow
 def test_corners_are_left_out_of_the_curvature():
     mesh = shapes.disc(24)
     square = np.array([[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [0.5, -0.5, 0.0]])

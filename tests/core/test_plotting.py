@@ -37,6 +37,7 @@ def test_the_curve_is_in_the_picture(small_ball, design, tmp_path):
     assert blue_share(nicmm.plot(small_ball, design.curves, view=-towards)) < 1e-4
 
 
+@pytest.mark.slow
 def test_unusable_arguments(small_ball, design, tmp_path):
     with pytest.raises(nicmm.ArgumentError, match="curves is a str"):
         nicmm.plot(small_ball, "curve")

@@ -246,6 +246,7 @@ class TestThreads:
         for number, design in enumerate(alone):
             np.testing.assert_array_equal(found[number].curves[0].points, design.curves[0].points)
 
+    @pytest.mark.slow
     def test_who_waits_for_a_designer_may_stop_waiting(self):
         designer, waits = nicmm.Designer(LARGE), []
         inside, stopped = threading.Event(), threading.Event()

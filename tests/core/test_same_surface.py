@@ -56,6 +56,7 @@ def test_the_curve_is_similar(curves, name):
     assert apart(points, curves[True].points) <= 0.02 * BODY.diagonal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["caps", "fans without area", "collapsed edges", "caps far away"])
 def test_a_curve_starts_from_a_curve_across_removed_faces(name):
     mesh = dict(defective_meshes())[name]
@@ -69,6 +70,7 @@ def test_a_curve_starts_from_a_curve_across_removed_faces(name):
     assert abs(again.curves[0].length - length) < 0.01 * length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["soup", "gaps", "T-junctions", "faces without area", "turned, doubled soup"]
 )
@@ -87,6 +89,7 @@ def test_a_curve_starts_from_a_curve_on_a_changed_mesh(name):
     np.testing.assert_allclose(place, 0.5 * (first.points[7] + first.points[8]), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [0.0, 1e-7])
 def test_curves_pass_exactly_through_points_of_removed_faces(height):
     """Points inside a face without area, and on its long side, at its tip and at its ends."""
@@ -102,6 +105,7 @@ def test_curves_pass_exactly_through_points_of_removed_faces(height):
             assert not judge(mesh, design, points, closed).faults, weights
 
 
+@pytest.mark.slow
 def test_maps_reach_all_vertices_at_a_position():
     """It is enough to paint one of the vertices of a soup at each place."""
     changed = same_surface.changed(BODY, "turned, doubled soup", 2)
@@ -113,6 +117,7 @@ def test_maps_reach_all_vertices_at_a_position():
     assert apart(design.curves[0].points, clean.curves[0].points) <= 1e-6 * BODY.diagonal
 
 
+@pytest.mark.slow
 def test_a_cube_of_twelve_faces_has_one_energy():
     cube = shapes.cube(1)
     corners = [0, 3, 5, 6]
@@ -123,6 +128,7 @@ def test_a_cube_of_twelve_faces_has_one_energy():
     np.testing.assert_allclose(energies, energies[0], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_loose_vertices_of_a_mesh_that_is_not_copied(monkeypatch, closed):
     """A mesh as if it were too large for a copy, so that loose vertices stay, with maps."""

@@ -21,6 +21,8 @@ from tests.core.checks import (
 )
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 ANGLES = np.array([0.0, 1.3, 2.5, 3.6, 5.0])
 HEIGHTS = np.array([0.1, -0.2, 0.15, 0.0, -0.1])
 CHOSEN = [12, 80, 41, 150]
@@ -258,6 +260,7 @@ def test_a_curve_of_an_earlier_session(ball):
     assert_valid_curve(ball, design.curves[0], moved.positions(ball))
 
 
+@pytest.mark.slow
 def test_a_given_order_begins_at_its_first_point(ball):
     """Whatever point the start begins at, even if the first point has moved or is gone."""
     designer, points = nicmm.Designer(ball), on_ball(ball)[np.array([3, 4, 0, 1, 2])]
@@ -310,6 +313,7 @@ def test_a_bare_curve_may_be_named_in_any_order(body):
     assert apart(now.curves[0].points, curve.points) < 0.01 * body.diagonal
 
 
+@pytest.mark.slow
 def test_other_methods_can_be_gone_on_from(ball):
     designer = nicmm.Designer(ball)
     level_set = designer.design(on_ball(ball), method="variational")
@@ -396,6 +400,7 @@ class TestRefusals:
         elsewhere = [int(v) for v in nearest_vertices(ball, circle(ANGLES[:3] + 0.3))]
         self.refused(ball, elsewhere, "none of them is where it was", start=start)
 
+    @pytest.mark.slow
     def test_what_is_no_curve(self, ball):
         points = on_ball(ball)
         start = nicmm.design_curve(ball, points).curves[0]
@@ -411,6 +416,7 @@ class TestRefusals:
         if not cancelled.curves:
             self.refused(ball, points, "has 0 curves", start=cancelled)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["faces", "barycentric", "points", "control_index", "closed"])
     def test_fields_of_any_kind(self, small_ball, name):
         """Whatever a field contains, the curve is a usable start or raises a typed error."""
@@ -515,6 +521,7 @@ class TestPaintedBesideACurve:
         _, difference = self.moved(ball, whole, after, place)
         assert difference < 0.6 * near
 
+    @pytest.mark.slow
     def test_the_numbers_of_the_points_do_not_matter(self, ball, designer, dab):
         """As in Blender, where an update gives the points in the order visited."""
         place, weights = dab
@@ -612,6 +619,7 @@ class TestNewLegs:
         assert np.abs(now.points[:, 2]).max() < 5e-3
         assert now.length == pytest.approx(np.radians(110.0), rel=5e-3)
 
+    @pytest.mark.slow
     def test_a_point_behind_a_limb_makes_no_detour(self):
         """The nearest position in space may be far away along the surface."""
         mesh, chosen = limbs_with_points()
@@ -635,6 +643,7 @@ class TestNewLegs:
             assert_valid_design(mesh, now)
             assert now.curves[0].length < 1.5 * anew.curves[0].length
 
+    @pytest.mark.slow
     def test_the_other_legs_keep_their_courses(self, ball):
         """They only move a little near the ends of the new leg."""
         designer, points = nicmm.Designer(ball), on_ball(ball)

@@ -624,6 +624,7 @@ def test_arrays_that_do_not_fit_are_refused(name, place):
             function(**replaced(given, place, lambda array, changed=changed: changed))
 
 
+@pytest.mark.slow
 @given(st.sampled_from(sorted(FINITE)), st.data())
 def test_numbers_that_are_not_finite_are_refused(name, data):
     function, arguments = CALLS[name]

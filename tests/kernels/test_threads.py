@@ -95,6 +95,7 @@ def test_cancelling_stops_all_threads(monkeypatch):
     assert sorted(ended) == [0, 1, 2]
 
 
+@pytest.mark.slow
 def test_a_design_does_not_depend_on_the_number_of_threads(monkeypatch):
     mesh = shapes.torus(around=60, across=30)
     points = [3, 700, 1200, 1500]

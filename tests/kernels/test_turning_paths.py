@@ -138,6 +138,7 @@ def test_routes_differ_as_in_brute_force(aligned, different):
     )
 
 
+@pytest.mark.slow
 @property_of(st.integers(0, 2**32 - 1))
 def test_paths_with_arbitrary_states_crash_nothing(seed):
     rng = np.random.default_rng(seed)

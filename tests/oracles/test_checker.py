@@ -89,6 +89,7 @@ class TestSelfContacts:
         places[3, 0] = np.nextafter(0.5, 0.0)
         assert contacts(on_square(places)) == (0, 0, 0)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("closed", [True, False])
     def test_same_verdict_as_plain_geometry(self, closed):
         """Random polygons on a coarse grid, on which touching is as common as crossing."""

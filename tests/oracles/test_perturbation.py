@@ -1,6 +1,7 @@
 """Tests that the perturbation of section 4.6 degrades a mesh as described, and is reproducible."""
 
 import numpy as np
+import pytest
 
 from nicmm_core import shapes
 from tests.oracles.perturbation import LEAST_ANGLE, angles, perturbed
@@ -11,6 +12,7 @@ def test_angles_of_a_known_triangle():
     np.testing.assert_allclose(angles(triangle), [[90.0, 45.0, 45.0]])
 
 
+@pytest.mark.slow
 def test_faces_get_worse_while_the_shape_and_the_control_points_stay():
     mesh = shapes.sphere(3)
     kept = np.array([3, 50, 400])

@@ -14,6 +14,8 @@ from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.discrete_curve import place_nodes
 from tests.core.checks import assert_valid_curve
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 def curves_through(mesh, chosen, closed):
     """Coarse mesh, a curve on it, and the curve mapped to the fine mesh."""

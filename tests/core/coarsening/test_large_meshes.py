@@ -11,6 +11,8 @@ from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
 from tests.core.checks import assert_valid_design, grid
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 @pytest.fixture(scope="module")
 def large():
@@ -29,6 +31,7 @@ def test_without_courses_the_curve_is_valid(large, without_courses, closed):
     assert_valid_design(large, design, closed=closed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed):
     square = grid(84)

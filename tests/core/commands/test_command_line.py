@@ -158,6 +158,7 @@ def test_bad_output_is_refused_before_the_work(tmp_path, capsys):
     assert "curve.xyz" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_shapes_writes_meshes_that_differ(tmp_path):
     assert main(["shapes", str(tmp_path / "meshes"), "--count", "2"]) == 0
     first, second = sorted((tmp_path / "meshes").iterdir())
@@ -166,6 +167,7 @@ def test_shapes_writes_meshes_that_differ(tmp_path):
     assert not np.array_equal(meshes[0].vertices[:100], meshes[1].vertices[:100])
 
 
+@pytest.mark.slow
 def test_pretrain_writes_weights_with_the_switches_asked_for(mesh_file, tmp_path, capsys):
     output = tmp_path / "weights.npz"
     options = ["--sets", "2", "--epochs", "1", "--no-attention"]
@@ -224,6 +226,7 @@ def test_automatic_maps_are_those_of_the_functions(mesh_file, tmp_path, options,
         np.testing.assert_array_equal(json.loads(output.read_text())["faces"], expected.faces)
 
 
+@pytest.mark.slow
 def test_offset_writes_the_curves_at_each_distance(mesh_file, tmp_path, capsys):
     curve, output = tmp_path / "curve.json", tmp_path / "parallel.json"
     assert main(["design", str(mesh_file), "--points", CHOSEN, "-o", str(curve)]) == 0
@@ -243,6 +246,7 @@ def test_offset_writes_the_curves_at_each_distance(mesh_file, tmp_path, capsys):
     assert "no place on that side is so far away" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_measures_are_printed_as_json(mesh_file, tmp_path, capsys):
     output = tmp_path / "curve.json"
     given = ["design", str(mesh_file), "--points", CHOSEN, "-o", str(output), "--measures"]

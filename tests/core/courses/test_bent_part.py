@@ -179,6 +179,7 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
     np.testing.assert_allclose(found.positions(surface.mesh), controls.positions(surface.mesh))
 
 
+@pytest.mark.slow
 def test_searches_for_parts_are_bounded(monkeypatch):
     """As many as are allowed, whether they gain or not, and none without work left."""
     tried = []

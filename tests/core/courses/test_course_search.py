@@ -55,6 +55,7 @@ def test_combinations_that_cross_cost_more(body):
     assert crossings(found).sum() < crossings(free).sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_courses_pass_their_points(body, closed):
     """In the given order, or in the order of the indices at the nodes."""
@@ -77,6 +78,7 @@ def test_courses_pass_their_points(body, closed):
                 np.testing.assert_array_equal(order, np.arange(4))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_many_legs_with_via_points(body, closed):
     """Courses of more than eight legs have more nodes; via points are no control points."""
@@ -144,9 +146,9 @@ def test_courses_bend_less_than_the_initial_path(monkeypatch):
         curve = design.resumable.curve
         return curve.length * bending_energy(curve.nodes) + 4.0 * np.pi**2
 
-    searched = [total(seed) for seed in range(8)]
+    searched = [total(seed) for seed in range(4)]
     monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))
-    by_path = [total(seed) for seed in range(8)]
+    by_path = [total(seed) for seed in range(4)]
     assert np.mean(np.log(np.divide(searched, by_path))) < np.log(0.9)
 
 

@@ -61,6 +61,7 @@ def test_no_courses_are_sought_on_needles():
     assert not list(surface.courses(request))
 
 
+@pytest.mark.slow
 def test_the_feature_map_is_computed_once_for_a_request(monkeypatch):
     """All searches and relaxations of a request use the same φ_fea."""
     body = shapes.creature(3, subdivisions=1)

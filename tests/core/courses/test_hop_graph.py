@@ -55,6 +55,7 @@ def on_body():
     return graph_through(mesh, mesh.vertices[[10, 300, 700]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["on_square", "on_body"])
 def test_a_path_and_its_reverse_cost_the_same(name, request):
     graph = request.getfixturevalue(name)

@@ -111,6 +111,7 @@ def test_in_any_order_a_polygon_becomes_simple(seed, closed):
     assert not crossings_in_plane(points[order], closed)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.booleans())
 def test_the_order_of_control_points_stays_unless_any_is_allowed(seed, closed):
     generator = np.random.default_rng(seed)

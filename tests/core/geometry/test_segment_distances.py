@@ -15,6 +15,8 @@ from nicmm_core.geometry.segment_distances import (
 )
 from tests.core.checks import random_surface_points
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 def inside_faces(mesh, count, seed):
     """Random segments, each between two points inside one face."""
@@ -83,6 +85,7 @@ def test_distances_from_a_bent_polyline_in_a_plane(flat_disc, closed, turned):
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_distances_from_a_segment_are_the_least_of_those_of_its_points():
     """Also where paths unfold so that the segment crosses the line of an edge."""
     mesh = shapes.creature(2, resolution=32, faces=400)
@@ -100,6 +103,7 @@ def test_distances_from_a_segment_are_the_least_of_those_of_its_points():
         np.testing.assert_allclose(found[near], expected[near], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_order_of_segments_does_not_matter():
     mesh = shapes.creature(2, resolution=32, faces=400)
     segments = segments_of(mesh, nicmm.design_curve(mesh, [5, 90, 170]).curves[0])
@@ -224,6 +228,7 @@ def test_a_segment_on_an_edge_is_as_near_as_its_points(surface):
         assert (found[near] <= bound[near] + 1e-9).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("name", ["ball", "flat_disc", "body"])
 def test_sides_are_those_of_the_enclosed_region(request, name, seed):

@@ -8,6 +8,7 @@ import pytest
 import nicmm_core as nicmm
 
 
+@pytest.mark.slow
 def test_any_object_with_vertices_and_faces(small_ball):
     other = SimpleNamespace(
         vertices=small_ball.vertices.tolist(), faces=small_ball.faces.astype(np.uint32)

@@ -15,6 +15,8 @@ from nicmm_core.geometry.segment_distances import SegmentDistances, segments_of
 from nicmm_core.geometry.surface_points import nearest_points
 from tests.core.checks import random_surface_points
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 NORMAL = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 
 
@@ -62,6 +64,7 @@ def assert_sound(mesh, curves):
         assert not len(crossing_segments(mesh.faces, points_of(curve), curve.closed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [0.5, -0.5])
 def test_an_offset_of_a_great_circle_is_a_circle_of_latitude(distance):
     errors = []
@@ -162,6 +165,7 @@ def test_a_distance_varies_linearly_between_control_points():
     np.testing.assert_allclose(found.points[:, 1], expected, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_the_distance_of_a_closed_curve_is_continued_from_its_last_point_to_its_first(ball):
     circle = great_circle(ball)
     widths = np.array([0.2, 0.2, 0.4, 0.4, 0.4, 0.2])
@@ -174,6 +178,7 @@ def test_the_distance_of_a_closed_curve_is_continued_from_its_last_point_to_its_
     assert (sides == 1.0).all()
 
 
+@pytest.mark.slow
 def test_offsets_split_at_a_neck():
     mesh = plane(24)
     corners = [
@@ -184,6 +189,7 @@ def test_offsets_split_at_a_neck():
     assert [len(nicmm.offset_curve(mesh, curve, each)) for each in (0.03, 0.07)] == [1, 2]
 
 
+@pytest.mark.slow
 def test_offsets_merge_on_the_other_side_of_a_tube(ring):
     """Around a tube of circumference 2.5, paths from both sides meet beyond half of that."""
     angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
@@ -194,6 +200,7 @@ def test_offsets_merge_on_the_other_side_of_a_tube(ring):
     assert not nicmm.offset_curve(ring, curve, 1.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "flat_disc", "ring", "body"])
 @pytest.mark.parametrize("share", [0.02, -0.05])
 def test_all_points_have_the_distance(request, name, share):
@@ -211,6 +218,7 @@ def test_all_points_have_the_distance(request, name, share):
         assert (sides[inner] == np.sign(distance)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @given(share=st.floats(-0.3, 0.3))
 @settings(max_examples=10)
@@ -227,6 +235,7 @@ def _random_curve(mesh, count, seed, closed):
     return nicmm.design_curve(mesh, points, order="shortest", closed=closed).curves[0]
 
 
+@pytest.mark.slow
 def test_an_offset_of_the_reversed_curve_is_on_the_other_side(ball):
     curve = great_circle(ball)
     order = np.arange(len(curve.faces))[::-1]
@@ -239,6 +248,7 @@ def test_an_offset_of_the_reversed_curve_is_on_the_other_side(ball):
     assert (one.points @ NORMAL > 0.1).all() and (other.points @ NORMAL > 0.1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["soup", "turned half", "doubled", "scaled"])
 def test_the_same_surface_has_the_same_offset(ball, change):
     points = ball.vertices[[5, 200, 400, 600]]
@@ -263,6 +273,7 @@ def test_the_same_surface_has_the_same_offset(ball, change):
     checked_curve(mesh, after, across_gaps=True)
 
 
+@pytest.mark.slow
 def test_a_surface_with_one_side_has_no_offsets_but_a_part_of_it_has():
     strip = shapes.moebius_strip()
     core = np.flatnonzero(np.abs(strip.vertices[:, 2]) < 1e-9)
@@ -301,6 +312,7 @@ def test_curves_that_are_not_on_the_mesh_are_refused(ball, ring):
         nicmm.offset_curve(ball, curve.points, 0.1)
 
 
+@pytest.mark.slow
 def test_several_distances_at_once_are_those_one_by_one(ball):
     curve = great_circle(ball)
     together = nicmm.Designer(ball).offset_curves(curve, [0.1, -0.2, 0.3])

@@ -123,6 +123,7 @@ def test_deviation_leaves_points_out_and_keeps_to_its_bound(small_ball):
         assert distance.max() <= deviation + 2e-3 * longest_edge(small_ball)
 
 
+@pytest.mark.slow
 def test_size_does_not_matter(small_ball):
     curve = nicmm.design_curve(small_ball, [1, 50, 90]).curves[0]
     cut = cut_mesh(small_ball, curve)

@@ -207,6 +207,7 @@ def test_curve_along_the_rim_bounds_the_whole_surface():
     assert enclosed_region(mesh, cut).area == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half_width", [0.2, 0.5])
 def test_a_strip_between_two_offsets_of_a_great_circle_has_the_area_of_a_zone(half_width):
     mesh = shapes.sphere(5)
@@ -236,6 +237,7 @@ def test_two_curves_around_a_tube_bound_a_region_although_one_does_not():
     assert region.area == pytest.approx(mesh.face_areas.sum() / 4.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_curves_that_cross_can_be_cut_one_after_the_other():
     mesh = grid(8)
     low, high = mesh.vertices[:, :2].min(axis=0), mesh.vertices[:, :2].max(axis=0)

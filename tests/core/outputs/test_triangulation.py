@@ -39,6 +39,7 @@ def test_orientation_is_exact():
     assert orientation(CORNERS[0], CORNERS[1], just_beside) == 1
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(
     seed=st.integers(0, 10**6),

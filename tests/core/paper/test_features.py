@@ -28,6 +28,7 @@ def test_indicator_is_one_at_the_control_points_and_small_elsewhere(ball):
     assert np.abs(indicator[far]).max() < 0.2
 
 
+@pytest.mark.slow
 def test_channels_are_position_normal_indicator_and_distance(body):
     points = locate_control_points(body, [3, 50, 200, 333], closed=True)
     problem = build_problem(body, points, order="shortest")
@@ -50,6 +51,7 @@ def test_channels_are_position_normal_indicator_and_distance(body):
     np.testing.assert_array_equal(problem.features[:, 7], problem.initial_distance)
 
 
+@pytest.mark.slow
 def test_maps_add_a_ninth_channel(small_ball):
     points = locate_control_points(small_ball, [3, 50, 120], closed=True)
     zeros = np.zeros(len(small_ball.vertices))
@@ -60,6 +62,7 @@ def test_maps_add_a_ninth_channel(small_ball):
         np.testing.assert_array_equal(problem.feature_map, BASELINE)
 
 
+@pytest.mark.slow
 def test_map_weights_are_interpolated_at_inserted_points(small_ball):
     """A control point in a face with three painted vertices is painted itself."""
     weights = np.zeros(len(small_ball.vertices))

@@ -88,6 +88,7 @@ def test_starts_from_the_level_set_of_the_network(network, problem):
     np.testing.assert_array_equal(np.sign(result.field[off]), np.sign(phi[off]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["untrained", "random"])
 def test_any_network_lowers_the_energy(problem, kind):
     network = initial_network(SMALL) if kind == "untrained" else random_network()
@@ -96,6 +97,7 @@ def test_any_network_lowers_the_energy(problem, kind):
     assert loss_of(problem, result.field) < 0.9 * loss_of(problem, problem.initial_distance)
 
 
+@pytest.mark.slow
 def test_network_given_is_not_changed(network, problem):
     before = {name: array.copy() for name, array in network.parameters.items()}
     fit(network, problem, WEIGHTS, few(3))
@@ -104,6 +106,7 @@ def test_network_given_is_not_changed(network, problem):
         np.testing.assert_array_equal(array, before[name])
 
 
+@pytest.mark.slow
 def test_repetition_gives_identical_arrays(network, problem):
     np.random.seed(1)
     state = np.random.get_state()[1].copy()
@@ -141,6 +144,7 @@ def test_stops_when_the_loss_falls_by_less_than_a_hundredth(network, problem):
     assert min(losses[: -patience - 1]) - min(losses[:-1]) >= 0.01 * min(losses[:-1])
 
 
+@pytest.mark.slow
 def test_a_large_smoothness_is_fitted_in_double_precision(small_ball):
     """The kernel at the marks cancels almost entirely, so that single precision is not enough."""
     design = nicmm.design_curve(
@@ -239,6 +243,7 @@ class TestSteps:
         steps.linearise(band, *system)
         return steps
 
+    @pytest.mark.slow
     def test_small_steps_change_the_output_as_solved(self, problem, band, system, marks):
         steps = self.steps(problem, band, system)
         linear = steps.solve(1e-2, np.zeros(len(band.unknowns), dtype=bool))
@@ -246,6 +251,7 @@ class TestSteps:
         found = steps.take(scale) / scale
         assert np.abs(found - linear).max() < 0.03 * np.abs(linear).max()
 
+    @pytest.mark.slow
     def test_step_is_downhill_and_shrinks_with_the_damping(self, problem, band, system, marks):
         hessian, gradient, _ = system
         steps = self.steps(problem, band, system)
@@ -257,6 +263,7 @@ class TestSteps:
             sizes.append(np.linalg.norm(change))
         assert sizes[-1] < 0.01 * sizes[0]
 
+    @pytest.mark.slow
     def test_held_vertices_hardly_move(self, problem, band, system, marks):
         steps = self.steps(problem, band, system)
         held = np.zeros(len(band.unknowns), dtype=bool)
@@ -281,6 +288,7 @@ class TestSteps:
         assert np.abs(after - before).max() > 1e-2 * scale
         assert not np.array_equal(after, again)
 
+    @pytest.mark.slow
     def test_step_is_the_change_of_the_networks_level_set(
         self, problem, band, system, marks, monkeypatch
     ):

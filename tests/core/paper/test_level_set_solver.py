@@ -151,6 +151,7 @@ def test_without_a_step_downhill_the_start_is_returned(problem, change):
     )
 
 
+@pytest.mark.slow
 def test_rejected_steps_are_not_kept_and_are_damped_more(problem):
     """The steps promise a decrease, but what they take raises the energy."""
     dampings = []
@@ -188,6 +189,7 @@ def test_stops_at_the_limit(problem):
         assert (result.status, result.iterations) == (Status.ITERATION_LIMIT, iterations)
 
 
+@pytest.mark.slow
 def test_stops_when_the_loss_has_not_fallen_for_the_patience(problem):
     """With a tolerance that every decrease satisfies, it stops at the first opportunity."""
     for patience in (1, 3):

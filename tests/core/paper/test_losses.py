@@ -208,6 +208,7 @@ def terms_of(problem, factor=0.9):
     return energy_of(problem, factor * problem.initial_distance + 0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_no_term_depends_on_the_unit_or_the_pose(body, problem, scale):
     turn = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
@@ -223,6 +224,7 @@ def test_interpolation_vanishes_for_the_initial_field(problem):
     assert interpolation_loss(energy_surface(problem), problem.initial_distance) == 0.0
 
 
+@pytest.mark.slow
 def test_energy_without_a_map_has_no_feature_term(small_ball):
     points = locate_control_points(small_ball, [3, 60, 100], closed=True)
     problem = build_problem(small_ball, points)
@@ -296,6 +298,7 @@ def test_gradients_of_all_terms_are_those_of_differences(small_ball):
         assert abs(difference) > 1e-6
 
 
+@pytest.mark.slow
 def test_single_precision_operators_give_the_same_terms_and_gradients(problem):
     """The tensors of pretraining, compared with dense matrices in double precision."""
     double = dense_tensors(problem.elements, energy_surface(problem))

@@ -67,6 +67,7 @@ def test_hessian_is_symmetric_and_positive_semidefinite(problem):
     assert eigenvalues[0] > -1e-10 * eigenvalues[-1]
 
 
+@pytest.mark.slow
 def test_hessian_is_that_of_a_perfect_fit(ball):
     """Up to the known terms of nonzero residuals, the Gauss–Newton Hessian is the exact one."""
     points = locate_control_points(ball, [3, 200, 400], closed=True)
@@ -127,6 +128,7 @@ def test_bending_depends_on_the_curve_and_not_on_the_slope(problem):
     assert found == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("term", ["sdf", "smooth", "feature"])
 def test_gradient_of_each_term_is_the_derivative(term):
     """On a random field, also where the slope is far from 1."""

@@ -158,6 +158,7 @@ def test_switches_remove_parameters(inputs):
 SWITCHED_CHANNELS = {"normals": [3, 4, 5], "control_indicator": [6], "distance": [7]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("switch", SWITCHED_CHANNELS)
 def test_a_channel_switched_off_is_not_seen(small_ball, switch):
     points = random_surface_points(small_ball, 4, seed=3)

@@ -144,6 +144,7 @@ class TestOperators:
             turned.divergence @ fields, sign * (plain.divergence @ fields), atol=1e-9
         )
 
+    @pytest.mark.slow
     def test_distance_to_the_path_is_smooth_across_it(self, ring):
         """|∇φ₀| is 1 on both sides of a meridian, across which φ₀ changes its sign."""
         points = locate_control_points(ring, torus_points(ring, 0, 1, 3), closed=True)

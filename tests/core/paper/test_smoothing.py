@@ -108,6 +108,7 @@ def test_the_mixed_system_solves_the_same(ball, length):
     np.testing.assert_allclose(areas[:, None] * found + length**4 * bent, right, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_vertex_of_thousands_of_edges_fills_no_matrix(monkeypatch):
     sizes = []
     plain = sparse_solver.linalg.splu

@@ -94,6 +94,7 @@ def test_stops_by_the_papers_rule(ball):
     assert (capped.status, capped.iterations) == (Status.ITERATION_LIMIT, 3)
 
 
+@pytest.mark.slow
 def test_can_be_watched_and_cancelled(ball):
     points = locate_control_points(ball, [3, 200, 400, 600], closed=True)
     problem = build_problem(ball, points, "shortest")

@@ -61,6 +61,7 @@ def assert_simple_loop(mesh, points, order, working, loop, closed=True):
     assert not any(controls.issuperset(edge) for edge in edges), "control points are neighbours"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["given", "shortest"])
 @pytest.mark.parametrize("count", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (5, 8))])
 def test_loops_through_random_vertices_are_simple(surface, count, order):

@@ -70,6 +70,7 @@ def test_the_spline_does_not_depend_on_the_first_point_or_the_direction():
         assert apart.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_curve_along_a_spline_passes_the_points_and_stays_near(surface):
     points = random_surface_points(surface, 3, 2)
     design = nicmm.design_curve(surface, points, closed=False)

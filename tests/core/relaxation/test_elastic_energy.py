@@ -223,6 +223,7 @@ CASES = {
 """Positions of nodes, whether the curve is closed, and the smoothness."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("mapped", [False, True])
 def test_energy_and_slope_are_those_of_the_formula(case, mapped):

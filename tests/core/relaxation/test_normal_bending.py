@@ -123,6 +123,7 @@ def on_unrolled_cylinder(across, along, tension, modes=8):
     return found.fun
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smoothness", [0.3, 3.0])
 def test_between_two_points_of_a_cylinder_the_curve_is_the_best_one(smoothness):
     mesh = cylinder(96, 48)
@@ -148,6 +149,7 @@ def corrugated(waves=6, height=0.06):
     return nicmm.Mesh(vertices, mesh.faces)
 
 
+@pytest.mark.slow
 def test_across_a_corrugated_plane_the_curve_climbs_less():
     """It crosses the waves more directly, or keeps to a valley; it bends less in space."""
     mesh = corrugated()
@@ -162,6 +164,7 @@ def test_across_a_corrugated_plane_the_curve_climbs_less():
     assert bent[2] <= bent[1] <= bent[0]
 
 
+@pytest.mark.slow
 def test_the_weight_is_continuous_at_zero(body):
     points = [10, 200, 400]
     none, little = (nicmm.design_curve(body, points, normal_bending=w) for w in (0.0, 1e-9))

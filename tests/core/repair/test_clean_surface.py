@@ -49,6 +49,7 @@ def test_a_changed_mesh_has_the_same_copy(shape, name):
     np.testing.assert_array_equal(other.faces, one.faces)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(
     st.sampled_from([None, "faces without area", "T-junctions"]),
@@ -148,6 +149,7 @@ def test_every_point_of_the_mesh_has_a_place_on_the_manifold(name):
             np.testing.assert_allclose(there, np.tile(point, (len(found), 1)), atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [12, 300])
 def test_a_fan_without_area_is_removed_whole(size):
     """Its faces lie over one another, so one can be removed only after another."""

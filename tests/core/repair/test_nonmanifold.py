@@ -230,6 +230,7 @@ def test_maps_and_via_points_reach_the_copy(name):
     assert below.curves[0].points[:, 2].mean() < 0.0
 
 
+@pytest.mark.slow
 def test_points_of_a_twin_face_and_of_a_cut_edge():
     """Control points lie in faces that the repaired mesh omits or subdivides."""
     ball = shapes.sphere(2)

@@ -247,6 +247,7 @@ def test_a_closed_curve_has_three_points():
         assert len(segment) >= 3
 
 
+@pytest.mark.slow
 def test_a_wild_polyline_gets_a_limited_number_of_regular_points():
     """With noise far above the tolerance, only the tolerance cannot be met."""
     generator = np.random.default_rng(0)

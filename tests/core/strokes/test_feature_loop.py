@@ -27,6 +27,7 @@ def assert_on_rim(rim, seed, away):
     assert len(found) <= 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [0, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, *range(4, 10)))]
 )
@@ -35,6 +36,7 @@ def test_the_margin_of_a_tooth_is_found(seed):
     assert_on_rim(rims.tooth(seed, vertices, noise), seed, away=1.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [0, 8, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (*range(1, 8), 9))]
 )
@@ -58,6 +60,7 @@ def test_the_line_at_an_open_end_is_open():
     np.testing.assert_allclose(ends[:, 0], 0.0, atol=0.03)
 
 
+@pytest.mark.slow
 def test_a_boundary_is_a_feature():
     mesh = shapes.annulus()
     found = nicmm.feature_loop(mesh, [0.32, 0.0, 0.0])
@@ -75,6 +78,7 @@ def test_marked_edges_are_followed_first():
     np.testing.assert_allclose(found[:, 2], 0.0, atol=0.03)
 
 
+@pytest.mark.slow
 def test_the_rim_of_painted_weights_is_followed():
     mesh = shapes.sphere(4)
     weights = (mesh.vertices[:, 2] > 0.5).astype(float)
@@ -83,6 +87,7 @@ def test_the_rim_of_painted_weights_is_followed():
     np.testing.assert_allclose(found[:, 2], 0.5, atol=0.1)
 
 
+@pytest.mark.slow
 def test_a_painted_region_without_a_whole_face_has_no_rim():
     """The sharp edge next to the point is followed as if nothing were painted."""
     mesh = shapes.cube(6)

@@ -32,7 +32,8 @@ def farthest(curve, stroke):
     return max(cKDTree(dense).query(other)[0].max(), cKDTree(other).query(dense)[0].max())
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("name", ["ball", "body", "ring"])
 def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
@@ -48,6 +49,7 @@ def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
     assert farthest(found, stroke) <= 2.0 * noise * 1.001
 
 
+@pytest.mark.slow
 def test_curves_with_normal_bending_stay_near_their_strokes(body):
     designer, tolerance = nicmm.Designer(body), 0.02 * body.diagonal
 
@@ -64,6 +66,7 @@ def test_curves_with_normal_bending_stay_near_their_strokes(body):
     assert max(away(seed) for seed in seeds) > tolerance  # the points depend on the shape
 
 
+@pytest.mark.slow
 def test_a_stroke_without_noise_is_followed_closely(ball):
     curve = nicmm.design_curve(ball, [5, 200, 400], closed=False).curves[0]
     tolerance = 1e-3 * ball.diagonal
@@ -74,6 +77,7 @@ def test_a_stroke_without_noise_is_followed_closely(ball):
     assert np.linalg.norm(fitted[-1] - curve.points[-1]) <= tolerance
 
 
+@pytest.mark.slow
 def test_a_smaller_tolerance_takes_more_points():
     mesh = shapes.sphere(4)
     angle = np.linspace(0.0, 4.0, 400)
@@ -91,6 +95,7 @@ def test_a_short_straight_stroke_has_two_points(ball):
     assert len(nicmm.fit_stroke(ball, line, 0.05)) == 2
 
 
+@pytest.mark.slow
 def test_the_same_stroke_gives_the_same_points(body):
     curve = nicmm.design_curve(body, random_surface_points(body, 3, 1), closed=False).curves[0]
     stroke = stroke_of(curve, 0.01 * body.diagonal)
@@ -98,6 +103,7 @@ def test_the_same_stroke_gives_the_same_points(body):
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_points_on_the_surface_are_returned(body):
     curve = nicmm.design_curve(body, random_surface_points(body, 3, 1), closed=False).curves[0]
     fitted = nicmm.fit_stroke(body, stroke_of(curve, 0.01 * body.diagonal), 0.02 * body.diagonal)
@@ -133,6 +139,7 @@ def test_a_stroke_from_one_part_to_another_is_refused():
         nicmm.fit_stroke(mesh, line, 0.15)
 
 
+@pytest.mark.slow
 def test_a_fit_can_be_cancelled_and_shows_its_curve(body, monkeypatch):
     monkeypatch.setattr(progress, "INTERVAL", 0.0)
     points = random_surface_points(body, 4, 1)

@@ -24,6 +24,7 @@ def right(creature):
     return nicmm.design_curve(creature, points_on_right(creature, 3, 4))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_mirror_image_is_a_valid_design(creature, closed):
     points = points_on_right(creature, 3, 4)
@@ -37,6 +38,7 @@ def test_mirror_image_is_a_valid_design(creature, closed):
         assert away < 1e-5 * creature.diagonal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sphere", "torus", "disc", "cube"])
 def test_where_the_triangulation_is_not_symmetric(name):
     mesh = getattr(shapes, name)()
@@ -61,6 +63,7 @@ def test_design_continues_from_the_mirror_image(creature, right):
     assert apart(design.curves[0].points, curve.points) < 0.01 * creature.diagonal
 
 
+@pytest.mark.slow
 def test_mirror_image_on_another_component(right, creature):
     shifted = nicmm.Mesh(FLIP * (creature.vertices + [3.0, 0.0, 0.0]), creature.faces)
     moved = nicmm.Mesh(creature.vertices + [3.0, 0.0, 0.0], creature.faces)

@@ -20,6 +20,8 @@ from tests.core.symmetry.symmetric_meshes import (
 )
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 SYMMETRIC = 1e-6
 """Greatest asymmetry on symmetric surfaces, relative to the diagonal."""
 
@@ -136,6 +138,7 @@ class TestTheOtherSide:
         left = nicmm.design_curve(creature, images, mirror=MIRROR)
         assert left.curves[0].length == pytest.approx(right.curves[0].length, rel=1e-4)
 
+    @pytest.mark.slow
     def test_every_plane_vector_gives_the_same_plane(self, creature):
         points = points_on_right(creature, 2, 4)
         one = nicmm.design_curve(creature, points, mirror=MIRROR)
@@ -163,6 +166,7 @@ class TestTheOtherSide:
     def test_without_a_mirror_there_is_no_asymmetry(self, creature):
         assert nicmm.design_curve(creature, points_on_right(creature, 3, 4)).asymmetry is None
 
+    @pytest.mark.slow
     def test_images_on_a_near_component_are_not_used(self, creature):
         """A shell around the body is nearer to some images than the body's own other side."""
         other = nicmm.Mesh(1.01 * FLIP * creature.vertices, creature.faces)
@@ -183,6 +187,7 @@ class TestTheOtherSide:
 
 
 class TestPointsOnThePlane:
+    @pytest.mark.slow
     def test_first_and_last_point_of_a_closed_curve(self, creature):
         on_plane = np.flatnonzero(creature.vertices[:, 0] == 0.0)[[0, -1]]
         (inner,) = points_on_right(creature, 1, 3)
@@ -208,6 +213,7 @@ class TestPointsOnThePlane:
 
 
 class TestOptions:
+    @pytest.mark.slow
     def test_equal_arguments_give_equal_curves(self, creature):
         points = points_on_right(creature, 3, 4)
         designer = nicmm.Designer(creature)
@@ -252,6 +258,7 @@ class TestOptions:
         for centre in (ball.vertices[left], FLIP * ball.vertices[left]):
             assert np.linalg.norm(curve.points - centre, axis=1).min() > 0.1
 
+    @pytest.mark.slow
     def test_via_points_are_mirrored(self, ring):
         """With a via point the first leg runs on the inner side of the tube, and so does its image.
 
@@ -419,6 +426,7 @@ class TestErrors:
         points = points_on_right(creature, 2, 0)
         self.refused(creature, points, nicmm.ArgumentError, "mirror needs", method="variational")
 
+    @pytest.mark.slow
     def test_surface_of_one_side_that_is_not_connected(self):
         """A ring with a slot across its right side connects the points only by its left side."""
         ring = shapes.annulus()
@@ -429,6 +437,7 @@ class TestErrors:
         self.refused(mesh, points, nicmm.UnreachableError, "on their side of the mirror")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["x", "0,0,0,1,0,0", "0,7,0,-2,0,0"])
 def test_command_line(creature, tmp_path, text):
     path, out = tmp_path / "mesh.obj", tmp_path / "curve.json"
