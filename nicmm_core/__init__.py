@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .geometry.mesh import MeshLike as MeshLike
     from .geometry.mesh import as_mesh as as_mesh
     from .geometry.surface_points import SurfacePoints as SurfacePoints
+    from .geometry.surface_points import nearest_points as nearest_points
     from .io.adapters import from_meshio as from_meshio
     from .io.adapters import from_open3d as from_open3d
     from .io.files import read_curve as read_curve
@@ -74,7 +75,10 @@ _NAMES = {
         "MeshLike",
         "as_mesh",
     ),
-    "geometry.surface_points": ("SurfacePoints",),
+    "geometry.surface_points": (
+        "SurfacePoints",
+        "nearest_points",
+    ),
     "io.adapters": (
         "from_meshio",
         "from_open3d",

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records the animation of the tour: clicks, a drag, another course, and the cut edges."""
+"""Records the animation of the tour: clicks, a drag, and another course."""
 
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -11,13 +10,13 @@ from screen import Blender, begin_choice, check, choose_tool, count_points, pixe
 PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
 """Sideways and upwards on the front of Suzanne's head."""
 
-VIEW = "1100x620+40+60"
+VIEW = "860x600+190+72"
 """The part of the screen that is recorded."""
 
 WIDTH = 720
 """Of the animation, in pixels."""
 
-POINTER = ((0, 0), (0, 17), (4, 13), (7, 19), (10, 18), (7, 12), (12, 12))
+POINTER = ((0, 0), (0, 25), (6, 19), (11, 29), (15, 27), (10, 18), (18, 18))
 """Outline of the pointer, which pictures of the screen do not contain."""
 
 
@@ -35,7 +34,7 @@ class Recording:
         self.folder = blender.folder / "frames"
         self.folder.mkdir()
         self.frames: list[tuple[Path, int]] = []
-        self.pixel = (150.0, 600.0)
+        self.pixel = (300.0, 560.0)
 
     def frame(self, duration: int = 8) -> None:
         """Take a picture after Blender has drawn its window."""
@@ -69,7 +68,7 @@ class Recording:
 
 
 def animation(blender: Blender) -> None:
-    """Five clicks, a drag, another course, the end, and the curve as cut edges."""
+    """Five clicks, a drag, another course, and the end."""
     step("Record the animation of the tour")
     blender.do("helper.suzanne()")
     blender.do("helper.look()")
@@ -110,5 +109,4 @@ def animation(blender: Blender) -> None:
     path = blender.shots / "tour.webp"
     recording.write(path)
     check(path.stat().st_size < 2_000_000, "the animation is smaller than 2 MB")
-    shutil.copy(recording.frames[-1][0], blender.shots / "tour-last.png")
     print(f"   {path.name}, {len(recording.frames)} frames, {path.stat().st_size // 1000} kB")

@@ -20,6 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from animation import animation  # noqa: E402
 from designers import designers  # noqa: E402
 from scans import crown, scans, snapping  # noqa: E402
 from screen import (  # noqa: E402
@@ -956,6 +957,7 @@ PARTS = {
     "scans": scans,
     "crown": crown,
     "snapping": snapping,
+    "animation": animation,
     "large": large,
 }
 """Parts of the drive; `live` and `picking` continue with the curve of `draw`."""

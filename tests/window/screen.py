@@ -114,7 +114,7 @@ class Blender:
 
     def shot(self, name: str) -> None:
         """Take a picture of the screen after Blender has drawn it."""
-        self.do("helper.area().tag_redraw()")
+        self.do("for area in bpy.context.window.screen.areas:\n    area.tag_redraw()")
         time.sleep(1.5)
         self.do("pass")
         path = self.shots / f"{name}.png"
@@ -233,13 +233,26 @@ def part_of_way(start, end, steps: int) -> tuple[float, float]:
 
 
 def install(blender: Blender, archive: Path) -> None:
-    step("Install the zip")
+    """Install the zip as *Install from Disk* does: choose it in the file browser, and confirm."""
+    step("Install from Disk")
     check(blender.do("value = bpy.app.background") is False, "a window")
     version = blender.do("value = bpy.app.version_string")
     blender.do(
-        "bpy.ops.extensions.package_install_files("
-        f'filepath={str(archive)!r}, repo="user_default", enable_on_install=True)'
+        "bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'\n"
+        "with helper.in_view():\n"
+        '    bpy.ops.extensions.package_install_files("INVOKE_DEFAULT")'
     )
+    browser = "[a for a in bpy.context.window.screen.areas if a.type == 'FILE_BROWSER']"
+    blender.wait(f"{browser} and {browser}[0].spaces.active.params is not None", "the file browser")
+    blender.do(
+        f"params = {browser}[0].spaces.active.params\n"
+        f"params.directory, params.filename = {bytes(archive.parent)!r}, {archive.name!r}"
+    )
+    blender.move((700, 400))
+    time.sleep(1.0)
+    blender.shot("0-install")
+    blender.key("Return")
     blender.wait('"bl_ext.user_default.nicmm_curves" in bpy.context.preferences.addons', "install")
+    blender.wait("any(a.type == 'VIEW_3D' for a in bpy.context.window.screen.areas)", "the window")
     blender.do("watch_tool()")
     print(f"   Blender {version}")

@@ -12,7 +12,7 @@ from nicmm_core.geometry.surface_points import (
     locate_points,
     nearest_points,
 )
-from tests.core.checks import joined, random_surface_points
+from tests.core.checks import assert_valid_curve, joined, random_surface_points
 
 SurfacePoints = nicmm.SurfacePoints
 
@@ -62,6 +62,29 @@ def test_nearest_points_in_a_face_without_area_are_on_its_longest_edge():
         expected = [[2.5, 0, 0], [0, 0, 0], [1, 0, 0]]
         np.testing.assert_allclose(found.positions(mesh), expected, atol=1e-12)
         np.testing.assert_allclose(distance, [0.2, 1.0, 0.1], atol=1e-12)
+
+
+def test_measured_positions_become_control_points(ball):
+    directions = np.array([[0.0, 0.3, 1.0], [1.0, 0.1, -0.2], [-0.5, 1.0, -0.4]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    points, distances = nicmm.nearest_points(ball, (2.0 * directions).tolist())
+    np.testing.assert_allclose(points.positions(ball), directions, atol=0.03)
+    np.testing.assert_allclose(distances, 1.0, rtol=0.02)
+    assert_valid_curve(ball, nicmm.design_curve(ball, points).curves[0], points.positions(ball))
+
+
+@pytest.mark.parametrize(
+    ("positions", "message"),
+    [
+        ([0.0, 1.0, 2.0], r"positions has shape \(3,\); pass three numbers per position"),
+        ([["x", "y", "z"]], "positions cannot be read as numbers"),
+        ([[0, 0, 0], [0, np.nan, 0]], r"positions\[1\] is NaN or infinite"),
+        ([[0, 0, 0], [1e200, 0, 0]], r"positions\[1\] is too far from the mesh"),
+    ],
+)
+def test_bad_positions_are_refused_by_name(ball, positions, message):
+    with pytest.raises(nicmm.ArgumentError, match=message):
+        nicmm.nearest_points(ball, positions)
 
 
 def test_coordinates_near_zero_snap_to_edges_and_vertices(ball):
