@@ -192,7 +192,7 @@ def _module_findings(runs: Mapping[str, Results]) -> str:
         if loss < 1.0:
             verdict = "lower, which contradicts the paper"
         elif loss - 1.0 < 0.25 * (paper - 1.0):
-            verdict = "hardly higher, which contradicts the size of the effect in the paper"
+            verdict = "hardly higher, which contradicts the paper in the size of the effect"
         else:
             verdict = "higher, which agrees with the paper"
         text += (

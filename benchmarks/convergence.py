@@ -242,7 +242,7 @@ def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     text += (
         "which agrees with the paper's “nearly indistinguishable”."
         if same == len(courses)
-        else "so the paper's “nearly indistinguishable” holds only for those."
+        else "which contradicts the paper's “nearly indistinguishable” on the others."
         if same
         else "which contradicts the paper's “nearly indistinguishable”."
     )
@@ -270,6 +270,6 @@ def _jumps(courses: Sequence[Results], after: int) -> str:
     return (
         f"After iteration {after} the loss jumps above its initial value on {len(jumping)} of "
         f"{len(courses)} sets ({report.listed(jumping)}), to up to {max(heights.values()):.1f} "
-        "times that value. This agrees with the paper, which warns of “numerical instability” "
-        "after too many iterations. The result is the field with the lowest loss."
+        "times that value, which agrees with the paper's warning of “numerical instability” after "
+        "too many iterations. The result is the field with the lowest loss."
     )

@@ -256,8 +256,8 @@ def _findings(results: Results) -> str:
         text += (
             f"For `nicmm` that is {'more' if visible else 'not more'} than the "
             f"{100 * REMARKABLE:g} % from which a difference is obvious to the eye, which "
-            f"{'contradicts' if visible else 'agrees with'} the “nearly identical shapes” of "
-            "Fig. 12. "
+            f"{'contradicts' if visible else 'agrees with'} the paper's “nearly identical shapes” "
+            "(Fig. 12). "
         )
     if "variational" not in at_worst:
         return text + "There are no curves of the variational method to compare with the paper."

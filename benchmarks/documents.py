@@ -5,6 +5,7 @@ Each block of figures is enclosed by `<!-- figures: NAME -->` and `<!-- /figures
 
 from __future__ import annotations
 
+import importlib
 import re
 import textwrap
 from collections import Counter, defaultdict
@@ -20,12 +21,14 @@ from . import (
     fuzz,
     guarantee,
     ninth_channel,
+    peers,
     prompts,
     report,
     sharp_edges,
     transfer,
 )
 from .evidence import ROOT, Record, Results
+from .peer_sizes import sizes_section
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
@@ -120,6 +123,39 @@ def _methods(curvature: Results, degraded: Results, runtime: Results) -> str:
         ),
     ]
     return report.table(("", *(f"`{method}`" for method in METHODS), "in the paper"), rows)
+
+
+PAPER = (
+    "pretraining",
+    "transfer",
+    "convergence",
+    "ablation",
+    "parameters",
+    "initial",
+    "curvature",
+    "runtime",
+    "peers",
+    "degraded",
+    "resolution",
+    "gallery",
+    "obstacles",
+    "one_loop",
+)
+"""Measurements of the tables and figures of the paper."""
+
+
+def _beside_paper(*results: Results) -> str:
+    """What each of these measurements says about the paper."""
+    rows = []
+    for name, found in zip(PAPER, results, strict=True):
+        module = importlib.import_module(f"benchmarks.{name}")
+        for verdict, sentences in report.verdicts(module.section(found)).items():
+            rows.append((report.link_to(module.TITLE), verdict, " ".join(sentences)))
+    return report.table(("in the paper", "our result", "what was measured"), rows)
+
+
+def _systems(results: Results) -> str:
+    return f"{peers.systems_table(results)}\n\n{sizes_section(results['sizes'])}"
 
 
 def _courses(results: Results) -> str:
@@ -429,6 +465,8 @@ FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
     "guarantee": (_guarantee, "guarantee"),
     "fairness": (_fairness, "guarantee"),
     "methods": (_methods, "curvature", "degraded", "runtime"),
+    "systems": (_systems, "peers"),
+    "beside_paper": (_beside_paper, *PAPER),
     "courses": (_courses, "courses"),
     "runtime": (_runtime, "runtime"),
     "stages": (_stages, "stages"),

@@ -119,7 +119,7 @@ def section(results: Results) -> str:
         + report.table(("with the lane / free", "25 %", "median", "75 %", "90 %"), rows)
         + f"\n\n{kept} of {len(aligned)} curves are one simple loop through their points in "
         "order, according to the independent checker. The paper shows alignment in Fig. 13, "
-        "without numbers; that curves follow lanes agrees with it."
+        "without numbers; that curves follow lanes agrees with the paper."
     )
 
 

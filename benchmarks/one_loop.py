@@ -121,7 +121,7 @@ def _finding(sets: Sequence[Results]) -> str:
         f"Fig. 16). On {alone} of {len(sets)} sets every step kept one loop by itself, "
     )
     text += (
-        "which agrees with that limitation; "
+        "which agrees with the paper; "
         if alone < len(sets)
         else "so the limitation does not show on these sets; "
     )

@@ -107,7 +107,7 @@ def section(results: Results) -> str:
         f"{results['seed']}). Systems that start from a path of edges get the initial path of this "
         "package, on a mesh with the same virtual splits. Meshes "
         f"({results['collection']}): {report.listed(names)}.{missing}\n\n"
-        f"{_table(results)}\n\n{_findings(results)}\n\n"
+        f"{systems_table(results)}\n\n{_findings(results)}\n\n"
         "The second table shows how the times grow with the mesh; each row is a number of "
         "vertices. *Another* is a further curve on the same Designer, and *later* is a further "
         "signed distance with stored factorisations.\n\n"
@@ -174,7 +174,8 @@ def _values(results: Results, system: str, name: str) -> list[float]:
     return [answer[name] for answer in answers if name in answer]
 
 
-def _table(results: Results) -> str:
+def systems_table(results: Results) -> str:
+    """What each system gives, one row for each."""
     rows = []
     sets = len(results["sets"])
     for system in (*results["methods"], *results["systems"]):

@@ -93,6 +93,32 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
+def link_to(title: str) -> str:
+    """Link from a page of docs/ to the section with a title."""
+    anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+    return f"[{title}](../benchmarks/RESULTS.md#{anchor})"
+
+
+VERDICTS = {
+    "agrees with the paper only": "agrees in part",
+    "agrees with the paper": "agrees",
+    "contradicts the paper": "contradicts",
+    "neither confirmed nor contradicted": "not tested",
+}
+"""Words with which sections compare with the paper, and the verdict that they mean."""
+
+
+def verdicts(section: str) -> dict[str, list[str]]:
+    """Sentences of a section that say whether the results agree with the paper, by verdict."""
+    prose = [part for part in section.split("\n\n") if not part.startswith(("|", "!", "*"))]
+    found: dict[str, list[str]] = {}
+    for sentence in re.split(r"(?<=[.”)]) (?=[A-Z“`])", " ".join(" ".join(prose).split())):
+        verdict = next((VERDICTS[words] for words in VERDICTS if words in sentence), None)
+        if verdict:
+            found.setdefault(verdict, []).append(sentence)
+    return found
+
+
 def figure(file_name: str, caption: str) -> str:
     """Markdown picture with its caption."""
     return f"![{caption}](figures/{file_name})\n\n*{caption}*"
