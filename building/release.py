@@ -85,6 +85,7 @@ def release(folder: Path, tests: bool) -> int:
             lambda platform=platform: _zip(folder, platform),  # type: ignore[misc]
         )
     made.check("the zip for this platform works in bpy", lambda: _tried(folder))
+    made.check("the scripts of the gallery draw their pictures", _gallery)
     made.check("the site is built without warnings", lambda: _site(folder))
     made.check("checksums", lambda: _checksums(folder))
     (folder / CHECKED).write_text(report(made.rows), encoding="utf-8")
@@ -200,6 +201,13 @@ def _tried(folder: Path) -> str:
     if ran.returncode != 0:
         raise BuildError(f"{ran.stdout[-500:]} {ran.stderr[-500:]}")
     return next(line for line in ran.stdout.splitlines() if line.startswith("Blender "))
+
+
+def _gallery() -> str:
+    with tempfile.TemporaryDirectory() as temporary:
+        if run([VENV_PYTHON, "-m", "docs.gallery", temporary]) != 0:
+            raise BuildError("a script of the gallery failed; see the output above")
+        return f"{len(list(Path(temporary).glob('*.webp')))} pictures"
 
 
 def _site(folder: Path) -> str:
