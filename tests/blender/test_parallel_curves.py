@@ -44,8 +44,8 @@ def test_parallel_curves_are_at_their_distances_and_the_curve_is_kept(equator):
 
 
 def test_a_positive_distance_is_on_the_left_side(equator):
-    points = scenes.points(equator)[:, :2]
-    area = np.cross(points, np.roll(points, -1, axis=0)).sum()
+    points = scenes.points(equator)
+    area = np.cross(points, np.roll(points, -1, axis=0))[:, 2].sum()
     parallel = add()
     assert np.sign(latitudes(parallel).mean()) == np.sign(area)
 

@@ -895,7 +895,7 @@ def test_segments_that_meet_are_those_of_brute_force(monkeypatch):
     start, end = given["starts"], given["ends"]
 
     def side(a, b, c):
-        return np.sign(np.cross(b - a, c - a))
+        return np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
     expected = {
         (i, j)

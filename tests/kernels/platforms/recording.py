@@ -209,6 +209,12 @@ def _pointer_offsets(kind: Any, start: int = 0) -> Iterator[int]:
         raise TypeError(f"{kind.__name__} is of a kind that is not recorded")
 
 
+def _bounds(owner: np.ndarray) -> tuple[int, int]:
+    """First address of an array that owns its memory, and the address behind its last byte."""
+    start = owner.__array_interface__["data"][0]
+    return start, start + owner.nbytes
+
+
 def _integers(*values: int) -> bytes:
     return struct.pack(f"<{len(values)}q", *values)
 
@@ -239,7 +245,7 @@ def record(designs: Iterable[Callable[[], object]]) -> Recording:
             number = numbers[kernel._name]
             if number & (number - 1):
                 return function(*given)
-            arrays = [np.byte_bounds(owner) for owner in owners.values()]
+            arrays = [_bounds(owner) for owner in owners.values()]
             memory = Memory(function.argtypes, given, arrays)
             return recording.add(kernel._name, function, memory)
 
