@@ -113,6 +113,7 @@ def strokes(blender: Blender) -> None:
     pixels = blender.do(f"value = helper.pixels({places}, 'Tooth')")
     draw_stroke(blender, pixels, "35-stroke")
     blender.wait("helper.curve() is not None and helper.count() > 1", "the curve of the stroke")
+    blender.wait("not helper.is_modal()", "the end of the work")
     count = blender.do("value = helper.count()")
     print(f"   {count} control points")
     check(count < 15, "few control points")
@@ -133,6 +134,7 @@ def strokes(blender: Blender) -> None:
     ]
     draw_stroke(blender, bow, "37-stretch")
     blender.wait(f"helper.state() != {before!r}", "the redrawn stretch")
+    blender.wait("not helper.is_modal()", "the end of the work")
     check(blender.do("value = helper.curve().name") == "Stroke", "the same curve")
     blender.shot("38-redrawn")
     blender.key("ctrl+z")
