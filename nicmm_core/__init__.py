@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from .geometry.mesh import MeshLike as MeshLike
     from .geometry.mesh import as_mesh as as_mesh
     from .geometry.surface_points import SurfacePoints as SurfacePoints
-    from .geometry.surface_points import nearest_points as nearest_points
     from .io.adapters import from_meshio as from_meshio
     from .io.adapters import from_open3d as from_open3d
     from .io.files import read_curve as read_curve
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from .outputs.region import Region as Region
     from .outputs.region import enclosed_region as enclosed_region
     from .plotting import plot as plot
+    from .projection import nearest_points as nearest_points
     from .status import Status as Status
 
 _NAMES = {
@@ -75,10 +75,7 @@ _NAMES = {
         "MeshLike",
         "as_mesh",
     ),
-    "geometry.surface_points": (
-        "SurfacePoints",
-        "nearest_points",
-    ),
+    "geometry.surface_points": ("SurfacePoints",),
     "io.adapters": (
         "from_meshio",
         "from_open3d",
@@ -110,6 +107,7 @@ _NAMES = {
         "enclosed_region",
     ),
     "plotting": ("plot",),
+    "projection": ("nearest_points",),
     "status": ("Status",),
 }
 """The public names of the package, by the module that defines them."""

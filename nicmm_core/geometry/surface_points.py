@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..errors import ArgumentError, ControlPointError, PointName, UnreachableError
+from ..errors import ControlPointError, PointName, UnreachableError
 from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, MeshLike, as_mesh, face_tree, real_array
+from .mesh import Mesh, face_tree, real_array
 from .vectors import dot
 
 
@@ -223,17 +223,15 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
 
 
 def nearest_points(
-    mesh: MeshLike, positions: ArrayLike, among: IntArray | None = None
+    mesh: Mesh, positions: FloatArray, among: IntArray | None = None
 ) -> tuple[SurfacePoints, FloatArray]:
-    """Find the points of a mesh nearest to positions in space.
-
-    The result can be passed as control points, for example of positions that were measured.
+    """Find the points of a mesh nearest to positions.
 
     Parameters
     ----------
-    mesh : Mesh or object with `vertices` and `faces`
-    positions : (k, 3) array_like of float
-        Positions, which may be anywhere.
+    mesh : Mesh
+    positions : (k, 3) float array
+        Positions in space.
     among : (q,) int array, optional
         Faces to search, by default all.
 
@@ -242,24 +240,8 @@ def nearest_points(
     SurfacePoints
         Nearest points. In a face without area, they are on its longest edge.
     (k,) float array
-        Distances, in mesh units.
-
-    Raises
-    ------
-    ArgumentError
-        If the positions are no array of that shape, or not finite.
-    MeshError
-        If the arrays of another library's mesh are not those of a triangle mesh.
-
-    Examples
-    --------
-    >>> from nicmm_core import nearest_points, shapes
-    >>> points, distances = nearest_points(shapes.sphere(3), [[0.0, 0.0, 2.0], [0.0, 3.0, 0.0]])
-    >>> distances.round(2)
-    array([1., 2.])
+        Distances, in mesh units; infinite where their squares overflow.
     """
-    mesh = as_mesh(mesh)
-    positions = _checked_positions(positions)
     trees = (
         mesh.face_trees if among is None else [(among, face_tree(mesh.vertices, mesh.faces[among]))]
     )
@@ -272,9 +254,6 @@ def nearest_points(
         squared[nearer] = np.atleast_1d(found[0])[nearer]
         faces[nearer] = part[np.atleast_1d(found[1])[nearer]]
         places[nearer] = np.atleast_2d(found[2])[nearer]
-    if not np.isfinite(squared).all():
-        first = int(np.argmin(np.isfinite(squared)))
-        raise ArgumentError(f"positions[{first}] is too far from the mesh; pass positions near it")
     corners = mesh.vertices[mesh.faces[faces]]
     barycentric = igl.barycentric_coordinates(places, *np.ascontiguousarray(corners.swapaxes(0, 1)))
     for flat in np.flatnonzero(~np.isfinite(barycentric).all(axis=1)):
@@ -283,20 +262,6 @@ def nearest_points(
     return SurfacePoints(faces, barycentric / barycentric.sum(axis=1, keepdims=True)), np.sqrt(
         squared
     )
-
-
-def _checked_positions(positions: ArrayLike) -> FloatArray:
-    """Convert positions to floats, shape (k, 3), or raise ArgumentError."""
-    try:
-        checked = real_array(positions)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"positions cannot be read as numbers ({error})") from error
-    if checked.ndim != 2 or checked.shape[1] != 3:
-        raise ArgumentError(f"positions has shape {checked.shape}; pass three numbers per position")
-    if not np.isfinite(checked).all():
-        first = int(np.argmin(np.isfinite(checked).all(axis=1)))
-        raise ArgumentError(f"positions[{first}] is NaN or infinite; pass finite positions")
-    return checked
 
 
 def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:

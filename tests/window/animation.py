@@ -5,10 +5,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from screen import Blender, begin_choice, check, choose_tool, count_points, pixel_of, step
-
-PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
-"""Sideways and upwards on the front of Suzanne's head."""
+from screen import PLACES, Blender, begin_choice, check, choose_tool, count_points, pixel_of, step
 
 VIEW = "860x590+190+88"
 """The part of the screen that is recorded."""

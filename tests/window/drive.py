@@ -25,6 +25,7 @@ from designers import designers  # noqa: E402
 from scans import crown, scans, snapping  # noqa: E402
 from screen import (  # noqa: E402
     HOLD,
+    PLACES,
     Blender,
     begin_choice,
     check,
@@ -43,8 +44,6 @@ from screen import (  # noqa: E402
     undo_and_redo,
 )
 
-# Sideways and upwards on the front of Suzanne's head, in this order: a loop around the face.
-PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
 DRAGGED, JUMPING = 3, 1
 
 SHIELD = ((-0.45, 0.1), (0.0, -0.05), (0.45, 0.1), (0.32, 0.45), (0.0, 0.72), (-0.32, 0.45))

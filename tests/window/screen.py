@@ -16,6 +16,9 @@ INSIDE = Path(__file__).resolve().with_name("inside.py")
 SYMMETRIC = 2e-3
 """Greatest asymmetry of the points of a curve object, which are those of an even spline."""
 
+PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
+"""Sideways and upwards on the front of Suzanne's head, in this order: a loop around the face."""
+
 PATIENCE = 60.0
 """Seconds that a step may take; software OpenGL is slow."""
 

@@ -64,6 +64,12 @@ def test_nearest_points_in_a_face_without_area_are_on_its_longest_edge():
         np.testing.assert_allclose(distance, [0.2, 1.0, 0.1], atol=1e-12)
 
 
+def test_distances_whose_squares_overflow_are_infinite(ball):
+    """Callers inside the package compare them with a tolerance, and name the argument."""
+    _, distance = nearest_points(ball, np.array([[1e200, 0.0, 0.0]]))
+    assert distance[0] == np.inf
+
+
 def test_measured_positions_become_control_points(ball):
     directions = np.array([[0.0, 0.3, 1.0], [1.0, 0.1, -0.2], [-0.5, 1.0, -0.4]])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
