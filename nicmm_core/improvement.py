@@ -17,13 +17,21 @@ from dataclasses import dataclass, field, replace
 from .courses.bent_part import bent_parts
 from .courses.comparison import distinct_by_energy, is_apart
 from .errors import NicmmError
+from .relaxation.close_points import bends_like_points
 from .relaxation.curve_energies import energies_of, relative_energies, scaled_bending
 from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
 from .request import Request
-from .start_search import MOST_FAILURES, InitialCurve, StartSearch, is_new
+from .start_search import (
+    MOST_FAILURES,
+    InitialCurve,
+    StartKind,
+    StartSearch,
+    has_many_points,
+    is_new,
+)
 
 SLIGHTLY_BENT = 10.0
 """L ∮ κ_g² ds above which the search is repeated, a quarter of the value of a circle.
@@ -45,12 +53,6 @@ The fairest curve then bends more along the surface in order to bend less with i
 
 WITH_AVOIDED_CURVES = 2.5
 """Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
-
-FEWEST_FOR_SPLINE = 6
-"""Least number of control points for which the spline through them is tried.
-
-Through fewer points, hardly any spline was better than the best course.
-"""
 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
@@ -150,30 +152,25 @@ class Improvement:
         self.starts.append(start)
         self.relaxed.append(relaxed)
 
-    def improve(self, courses: Iterator[InitialCurve], by_course: bool) -> None:
+    def improve(self, courses: Iterator[InitialCurve], start_kind: StartKind) -> None:
         """Make all attempts that follow the first one.
 
         Parameters
         ----------
         courses : iterator of InitialCurve
             Other courses of the first search. Those that remain are for alternatives.
-        by_course : bool
-            Whether the first start is a course. If no course was simple, further searches would
-            hardly find one and take long, so they are made only for alternatives.
+        start_kind : StartKind
+            What the first start is. After a spline that bends hardly more than its control points
+            require, there are no searches. If no course was simple, further searches would hardly
+            find one and take long, so they are made only for alternatives.
         """
         request = self.request
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
-        if self._has_many_points:
-            self._try_spline()
-        if by_course:
-            self._try_other_courses(courses)
-            for repeated in further:
-                if not (self._should_search_again() and self._try_courses(repeated)):
-                    break
-        self._try_other_parts()
+        if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
+            self._search(courses, further, start_kind)
         if self._should_tighten():
             self.attempt(self.starts[self.best], self._limited(TIGHTENED))
-        if by_course and self._should_try_path():
+        if start_kind is not StartKind.PATH and self._should_try_path():
             # On steps and creases, the initial path may be better than any course. It is only
             # another candidate, so its errors do not matter.
             start = None
@@ -186,6 +183,29 @@ class Improvement:
             new = (start for start in others if is_new(start, self.curves))
             for start in itertools.islice(new, MAX_COURSES_RELAXED + 2 * request.alternatives):
                 self.attempt(start, relaxation_config(request))
+
+    def _search(
+        self,
+        courses: Iterator[InitialCurve],
+        further: list[Iterator[InitialCurve]],
+        start_kind: StartKind,
+    ) -> None:
+        """Try the spline, courses of the first search and of further ones, and other parts."""
+        if start_kind is StartKind.SPLINE:
+            self.searches = 0
+            by_course = self._try_courses(courses)
+            self.spline_found_same_curve = self.repeat_found_same_curve
+        else:
+            by_course = start_kind is StartKind.COURSE
+            if has_many_points(self.request):
+                self._try_spline()
+            if by_course:
+                self._try_other_courses(courses)
+        if by_course:
+            for repeated in further:
+                if not (self._should_search_again() and self._try_courses(repeated)):
+                    break
+        self._try_other_parts()
 
     @property
     def _config(self) -> RelaxationConfig:
@@ -236,7 +256,7 @@ class Improvement:
         """Try the best curve with other courses in the parts that bend most."""
         changed = self.best
         parts = bent_parts(self.curves[changed])
-        for _ in range(OF_MANY_POINTS if self._has_many_points else SEARCHES_FOR_PARTS):
+        for _ in range(OF_MANY_POINTS if has_many_points(self.request) else SEARCHES_FOR_PARTS):
             part = next(parts, None)
             if part is None or not self._should_try_another_part():
                 break
@@ -354,11 +374,6 @@ class Improvement:
         unpainted = replace(self._surface, feature_map=None)
         scale = self.curves[0].length
         return float(energies_of(unpainted, [curve], self.request.smoothness, scale)[0])
-
-    @property
-    def _has_many_points(self) -> bool:
-        """Whether control points alone, without via points, determine most of the course."""
-        return len(self.request.points) >= FEWEST_FOR_SPLINE and not self.request.via_points
 
     @property
     def _is_kinked(self) -> bool:

@@ -1,14 +1,17 @@
 """Searches for starts: simple curves on a mesh from which relaxation begins.
 
-A start is a course of a search (`courses`), or the initial path (`path`) if no course is found. On
-a large mesh courses are searched for on a coarse mesh (`coarsening`).
+A start is a course of a search (`courses`), the spline through many control points (`spline`), or
+the initial path (`path`). On a large mesh courses are searched for on a coarse mesh (`coarsening`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
+
+import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
 from .courses.bent_part import BentPart, request_for_part, with_part
@@ -23,8 +26,9 @@ from .new_legs import Leg, request_for_leg, with_new_legs
 from .path.initial_path import find_initial_path, path_curve
 from .path.spline_path import spline_samples
 from .progress import checkpoint
+from .relaxation.close_points import GREATEST_TURN, has_short_legs, turns
 from .relaxation.curve_along import curve_along
-from .relaxation.curve_nodes import CurveSurface
+from .relaxation.curve_nodes import CurveSurface, nodes_at
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
 from .request import Request
@@ -34,6 +38,21 @@ MOST_FAILURES = 4
 
 On rough meshes each of them takes long.
 """
+
+
+FEWEST_FOR_SPLINE = 6
+"""Least number of control points for which the spline through them is tried.
+
+Through fewer points, hardly any spline was better than the best course.
+"""
+
+
+class StartKind(Enum):
+    """What a curve begins with."""
+
+    COURSE = "course of a search"
+    SPLINE = "spline through control points"
+    PATH = "initial path"
 
 
 @dataclass(frozen=True)
@@ -83,6 +102,42 @@ class StartSearch:
         self.mesh = mesh
         self.transferred = 0
         self.surface = MappedSurface(mesh)
+
+    def first(
+        self, request: Request, courses: Iterator[InitialCurve]
+    ) -> tuple[InitialCurve, StartKind]:
+        """The start with which the search for a curve begins.
+
+        It is the spline through control points that are close together; or else the first of some
+        courses; or else the spline through many control points, or the initial path.
+
+        Raises
+        ------
+        UnreachableError
+            If no simple curve passes through the points in this order.
+        """
+        by_points = request.order == "given" and has_many_points(request)
+        in_order = np.arange(len(request.points))
+        if by_points and has_plain_energy(request) and self._points_turn_little(request):
+            start = self.by_spline(request, in_order)
+            if start is not None:
+                assert isinstance(start.curve, DiscreteCurve)
+                if has_short_legs(start.curve):
+                    return start, StartKind.SPLINE
+        start = next(courses, None)
+        if start is not None:
+            return start, StartKind.COURSE
+        start = self.by_spline(request, in_order) if by_points else None
+        if start is not None:
+            return start, StartKind.SPLINE
+        return self.by_path(request), StartKind.PATH
+
+    def _points_turn_little(self, request: Request) -> bool:
+        """Whether lines between the control points, in the given order, turn little."""
+        nodes = nodes_at(self.surface.without_maps, request.points, request.closed)
+        angles = turns(nodes.positions, nodes.normals, request.closed)
+        angles[request.corners] = 0.0
+        return bool((angles <= GREATEST_TURN).all())
 
     def courses(
         self,
@@ -206,6 +261,16 @@ class StartSearch:
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
         return CoarseStarts(self.surface.without_maps)
+
+
+def has_many_points(request: Request) -> bool:
+    """Whether control points alone, without via points, determine most of the course."""
+    return len(request.points) >= FEWEST_FOR_SPLINE and not request.via_points
+
+
+def has_plain_energy(request: Request) -> bool:
+    """Whether only the length and the geodesic curvature of a curve determine its energy."""
+    return not (request.has_maps or request.avoid or request.normal_bending)
 
 
 def is_new(start: InitialCurve, curves: list[DiscreteCurve]) -> bool:

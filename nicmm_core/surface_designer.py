@@ -212,10 +212,7 @@ class SurfaceDesigner:
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
             courses = search.courses(request)
-            start = next(courses, None)
-            by_course = start is not None
-            if start is None:
-                start = search.by_path(request)
+            start, kind = search.first(request, courses)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
             cancelled = first.status is Status.CANCELLED
@@ -230,7 +227,7 @@ class SurfaceDesigner:
                 [first],
             )
             try:
-                improvement.improve(courses, by_course)
+                improvement.improve(courses, kind)
             except CancelledError:
                 cancelled = True
         starts, relaxed = improvement.starts, improvement.relaxed

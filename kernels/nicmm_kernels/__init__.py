@@ -27,6 +27,7 @@ from .levels import (
     place_on_polyline,
 )
 from .library import KernelError, MissingLibraryError
+from .nearest_places import nearest_places
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import BatchRules, relax_curves
@@ -85,6 +86,7 @@ __all__ = [
     "least_sums",
     "meeting_segments",
     "nearest_cells",
+    "nearest_places",
     "place_nodes",
     "place_on_polyline",
     "places_on_traces",

@@ -8,10 +8,10 @@ The only requirement on the mesh is that it is connected. Dijkstra's algorithm f
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -22,7 +22,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, corners_differ, edge_lengths
 from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
-from ..geometry.surface_points import SurfacePoints, nearest_points
+from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 from ..repair.degenerate_faces import degenerate_faces, perturbed
 
@@ -85,33 +85,50 @@ class CoarseMesh:
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
 
-        return nearest_in_cells(
-            self.mesh,
-            points.positions(fine),
-            self.cell[corner],
-            lambda cell: self.mesh.faces_at(self.cells_around(cell)),
-        )
+        cells, group = np.unique(self.cell[corner], return_inverse=True)
+        at_cells = self.mesh.vertex_faces.astype(np.int32)
+        around = at_cells[cells] @ at_cells.T @ at_cells
+        return _nearest_in_groups(self.mesh, points.positions(fine), group, around)
+
+    def nearest_fine_points(
+        self, fine: Mesh, positions: FloatArray, cell: IntArray
+    ) -> SurfacePoints:
+        """Project positions, (n, 3), each to the fine faces of its cell, (n,).
+
+        Raises
+        ------
+        UnreachableError
+            If a cell has no fine face.
+        """
+        cells, group = np.unique(cell, return_inverse=True)
+        inside = self._vertices_of_cells[cells] @ fine.vertex_faces
+        return _nearest_in_groups(fine, positions, group, inside)
 
 
-def nearest_in_cells(
-    mesh: Mesh, positions: FloatArray, cell: IntArray, faces_of: Callable[[IntArray], IntArray]
+def _nearest_in_groups(
+    mesh: Mesh, positions: FloatArray, group: IntArray, faces: sparse.csr_array
 ) -> SurfacePoints:
-    """Project positions, (n, 3), each to the faces of its cell, (n,), which a function gives.
+    """Project positions, (n, 3), each to the faces in the row of its group, (n,).
 
     Raises
     ------
     UnreachableError
-        If a cell has no face.
+        If a group has no face.
     """
-    faces, barycentric = np.zeros(len(cell), np.int64), np.zeros((len(cell), 3))
-    for one in np.unique(cell):
-        checkpoint()
-        here, among = np.flatnonzero(cell == one), faces_of(one[None])
-        if not len(among):
-            raise UnreachableError("a cell of the coarse mesh has no face")
-        found, _ = nearest_points(mesh, positions[here], among)
-        faces[here], barycentric[here] = found.faces, found.barycentric
-    return SurfacePoints(faces, barycentric)
+    begins = faces.indptr.astype(np.int64)
+    if not np.diff(begins).all():
+        raise UnreachableError("a cell of the coarse mesh has no face")
+    faces.sort_indices()
+    return SurfacePoints(
+        *nicmm_kernels.nearest_places(
+            mesh.for_kernels,
+            np.ascontiguousarray(positions),
+            group.astype(np.int64),
+            begins,
+            faces.indices.astype(np.int64),
+            checkpoint,
+        )
+    )
 
 
 def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> CoarseMesh:

@@ -8,7 +8,6 @@ on that side.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..geometry.surface_points import SurfacePoints
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.simple_curve import simple_curve
-from .coarse_mesh import CoarseMesh, nearest_in_cells
+from .coarse_mesh import CoarseMesh
 
 
 def nodes_on_fine_mesh(
@@ -37,7 +36,6 @@ def nodes_on_fine_mesh(
     """
     fine, places = surface.mesh, coarse_curve.nodes.places
     cell = coarse.mesh.faces[places.faces, places.barycentric.argmax(axis=1)]
-    faces_of = partial(coarse.faces_of_cells, fine)
 
     def cells_around(faces: IntArray) -> Iterator[IntArray]:
         cells = np.unique(coarse.cell[fine.faces[faces, 0]])
@@ -47,7 +45,7 @@ def nodes_on_fine_mesh(
 
     return simple_curve(
         surface,
-        nearest_in_cells(fine, places.positions(coarse.mesh), cell, faces_of),
+        coarse.nearest_fine_points(fine, places.positions(coarse.mesh), cell),
         coarse_curve.control_nodes,
         controls,
         coarse_curve.closed,

@@ -100,6 +100,6 @@ def test_the_spline_through_many_points_is_tried(ball, monkeypatch):
         return by_spline(search, request, visited)
 
     monkeypatch.setattr(start_search.StartSearch, "by_spline", spy)
-    for count in (4, improvement.FEWEST_FOR_SPLINE):
+    for count in (4, start_search.FEWEST_FOR_SPLINE):
         nicmm.design_curve(ball, random_surface_points(ball, count, 1), order="shortest")
-    assert tried == [improvement.FEWEST_FOR_SPLINE]
+    assert tried == [start_search.FEWEST_FOR_SPLINE]

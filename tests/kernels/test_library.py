@@ -440,6 +440,19 @@ def arguments_distinct(c=4):
     return {"positions": positions, "order": np.arange(c), "limit": 0.1, "meanwhile": nothing}
 
 
+def arguments_nearest(n=4):
+    """Arguments of `nearest_places` for n positions and two groups, by name."""
+    faces = np.arange(9)
+    return {
+        "mesh": BALL.for_kernels,
+        "positions": 1.1 * BALL.vertices[BALL.faces[:n, 0]],
+        "groups": np.arange(n) % 2,
+        "begins": np.array([0, 4, 9]),
+        "faces": faces,
+        "meanwhile": nothing,
+    }
+
+
 def arguments_sums():
     """Arguments of `least_sums`, by name."""
     generator = np.random.default_rng(3)
@@ -449,6 +462,7 @@ def arguments_sums():
 CALLS = {
     "least_sums": (nicmm_kernels.least_sums, arguments_sums),
     "distinct_curves": (nicmm_kernels.distinct_curves, arguments_distinct),
+    "nearest_places": (nicmm_kernels.nearest_places, arguments_nearest),
     "turning_paths": (nicmm_kernels.turning_paths, arguments_turning),
     "best_legs": (nicmm_kernels.best_legs, arguments_legs),
     "distinct_routes": (nicmm_kernels.distinct_routes, arguments_routes),
@@ -485,6 +499,7 @@ FINITE = {
     "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
     "distances_from_segments": [("starts", None), ("ends", None)],
     "trace_steps": [("places", 1)],
+    "nearest_places": [("positions", None)],
     "relax_curves": [("barycentric", None)],
     "CurveRelaxation": [("barycentric", None)],
 }
@@ -510,6 +525,7 @@ INDICES = {
     "turning_paths": [("onward", 1), ("leaving", 1), ("arriving", 1)],
     "best_legs": [("graph", 2), ("graph", 3)],
     "distinct_curves": [("order", None)],
+    "nearest_places": [("groups", None), ("faces", None)],
     "distinct_routes": [("via", None)],
 }
 """Arrays of indices."""
@@ -521,6 +537,8 @@ OF_ANY_LENGTH = [
     ("segment_ends", "segments"),
     ("polyline_crossings", "all_faces"),
     ("nearest_cells", "vertices"),
+    ("nearest_places", "begins"),
+    ("nearest_places", "faces"),
     ("turning_paths", "begins"),
     ("distinct_routes", "via"),
     ("least_sums", "other"),
@@ -533,6 +551,7 @@ ON_MESHES = [
     "EdgeGraphArrays",
     "TraceArrays",
     "distances_from_segments",
+    "nearest_places",
     "place_nodes",
     "relax_curves",
     "trace_between",
@@ -547,6 +566,7 @@ RESUMED = [
     "distances_along_edges",
     "meeting_segments",
     "nearest_cells",
+    "nearest_places",
     "points_on_edge_paths",
     "polyline_crossings",
     "relax_curves",
