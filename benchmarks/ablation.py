@@ -16,10 +16,9 @@ from nicmm_core.paper.network import Network, NetworkConfig, level_set, network_
 from nicmm_core.status import Status
 
 from . import collections, plots, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .scale import Scale
 from .solving import (
-    PARTS_WITHOUT,
     Sample,
     random_samples,
     run_networks,
@@ -30,7 +29,7 @@ from .solving import (
 
 TITLE = "Ablation (Table 3, Table 4)"
 TIMED = True
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 11
 TEST_SEED = 12

@@ -18,12 +18,12 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from tests.oracles.defects import defective_meshes
 
 from . import report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .scale import Scale
 
 TITLE = "Cancelling"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 0
 

@@ -16,10 +16,9 @@ from nicmm_core.paper.weights_file import load_network
 from nicmm_core.status import Status
 
 from . import collections, plots, renders, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .scale import Scale
 from .solving import (
-    PARTS_WITHOUT,
     Sample,
     designed_curve,
     random_samples,
@@ -29,7 +28,7 @@ from .solving import (
 )
 
 TITLE = "Convergence and early stop (Fig. 3, Fig. 4)"
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 3
 LATER = (50, 100)

@@ -11,11 +11,12 @@ from nicmm_core.relaxation.elastic_energy import comparable_energies
 
 from . import collections, renders, report
 from .courses import without_courses
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Courses in pictures"
+ROOMS = DESIGN
 
 SEED = 29
 

@@ -28,14 +28,14 @@ from nicmm_core.relaxation.discrete_curve import DiscreteCurve
 from nicmm_core.relaxation.elastic_energy import comparable_energies
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .parallel import in_processes
 from .progress import resumed
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Which course a curve takes"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 23
 

@@ -20,7 +20,7 @@ from nicmm_core.paper.problem import build_problem
 
 from . import collections, plots, renders, report
 from .elastic_curve import NODES, elastic_curve
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .measures import SAMPLES, bending, curvature_along
 from .methods import METHODS
 from .polylines import initial_path
@@ -28,7 +28,7 @@ from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Geodesic curvature (Fig. 7, 8, Eq. 10)"
-WITHOUT = ("outputs", "splines")
+ROOMS = EVERY_METHOD
 
 SEED = 0
 INITIAL, REFERENCE = "initial path", "reference curve"

@@ -13,11 +13,12 @@ from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import unique_edges
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import point_sets
 from .scale import Scale
 
 TITLE = "Cuts along curves"
+ROOMS = (*DESIGN, "outputs")
 
 SEED = 0
 

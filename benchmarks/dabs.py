@@ -13,12 +13,12 @@ from nicmm_core.geometry.curve import SurfaceCurve, resample
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "A dab of paint beside a curve"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 25
 

@@ -22,14 +22,14 @@ from tests.oracles import same_surface
 from tests.oracles.checker import judge
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .parallel import in_processes
 from .progress import resumed
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Defects that keep the surface"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 42
 

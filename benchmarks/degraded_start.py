@@ -18,12 +18,12 @@ from tests.oracles.distances import distances
 from tests.oracles.perturbation import perturbed
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "What moves a curve on degraded meshes"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 11
 

@@ -40,9 +40,7 @@ AROUND = "around a torus, the handles of a double torus, a Möbius strip, a hole
 
 def generated(records: Mapping[str, Record]) -> dict[Path, str]:
     """Text of every document, with all parts that depend on data files regenerated, by path."""
-    measured = {
-        name: record["results"] for name, record in records.items() if record["code"] is not None
-    }
+    measured = {name: record["results"] for name, record in records.items()}
     blocks = {
         name: write(*(measured[each] for each in sources))
         for name, (write, *sources) in FIGURES.items()

@@ -15,7 +15,7 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.checker import judge
 
 from . import collections, report
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .measures import bending
 from .peer_systems import later_signed_heat, task_on
 from .samples import random_sets
@@ -23,7 +23,7 @@ from .scale import Scale
 
 TITLE = "Dragging a control point"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = EVERY_METHOD
 
 SEED = 0
 DRAGS = 5

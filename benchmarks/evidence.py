@@ -1,8 +1,8 @@
-"""Data files: the results of each measurement, and the code, meshes and machine they come from.
+"""Data files: the results of each measurement, and the code and the machine they come from.
 
-`benchmarks/data/NAME.json` contains the results of a measurement and a fingerprint of every
-statement that they depend on. RESULTS.md and the figures in other documents are generated from
-these files. `python -m benchmarks stale` lists the measurements whose code has changed since.
+`benchmarks/data/NAME.json` contains the results of a measurement and a digest of the code that they
+depend on. RESULTS.md and the figures in other documents are generated from these files.
+`python -m benchmarks stale` lists the measurements whose code has changed since.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import importlib
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -22,8 +21,6 @@ from typing import Any
 
 import numpy
 import scipy
-
-from tests.oracles.mesh_files import INDEX
 
 from .scale import Scale
 
@@ -38,19 +35,23 @@ DATA = ROOT / "benchmarks" / "data"
 QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
 """Output folder of quick and smoke runs; not under version control."""
 
-WEIGHTS = "nicmm_core/paper/weights"
-KERNELS = ROOT / "kernels"
-"""Compiled kernels: all files of the C sources, and of the package that passes arrays to them."""
-
-PRESENTATION = tuple(
-    f"benchmarks/{name}.py" for name in ("__init__", "evidence", "progress", "report", "scale")
+NETWORK = ("geometry", "maps", "paper", "path", "repair")
+DESIGN = (
+    *("avoidance", "coarsening", "courses", "geometry", "maps"),
+    *("path", "relaxation", "repair", "symmetry"),
 )
-"""Modules that only keep or present results; they are left out of the fingerprints."""
+EVERY_METHOD = (*DESIGN, "paper")
+"""Folders of the core that a measurement may name as its `ROOMS`; those of the methods of the
+paper, of the default method, and of both."""
+
+PRESENTATION = ("documents", "evidence", "plots", "progress", "report", "scale")
+"""Modules of this package that only keep or present results."""
+
+SOURCES = (".py", ".c", ".h", ".npz")
+"""Endings of the files that count."""
 
 LINE = 100
 """Number of characters up to which a value in a data file is written on one line."""
-
-Read = Callable[[Path], bytes]
 
 
 def folder_of(scale: Scale) -> Path:
@@ -58,7 +59,7 @@ def folder_of(scale: Scale) -> Path:
     return DATA if scale is Scale.FULL else QUICK_OUTPUT / "data"
 
 
-def save(name: str, code: dict[str, str], results: Results, seconds: float, scale: Scale) -> Record:
+def save(name: str, code: str, results: Results, seconds: float, scale: Scale) -> Record:
     """Write the data file of a measurement and return its content as read back.
 
     `code` is `code_behind` when the measurement began; the files may have changed since.
@@ -70,7 +71,6 @@ def save(name: str, code: dict[str, str], results: Results, seconds: float, scal
         "machine": machine(),
         "seconds": round(seconds),
         "code": code,
-        "meshes": meshes_behind(name),
         "results": results,
     }
     path = folder_of(scale) / f"{name}.json"
@@ -109,6 +109,11 @@ def is_kept(name: str) -> bool:
     return (DATA / f"{name}.json").exists()
 
 
+def is_current(name: str) -> bool:
+    """Whether the data file of a full run is that of the present code, as far as that is known."""
+    return is_kept(name) and load(name)["code"] == code_behind(name)
+
+
 def machine() -> str:
     """One-line description of the machine and of the library versions."""
     return (
@@ -118,89 +123,46 @@ def machine() -> str:
     )
 
 
-def what_changed(name: str, read: Read = Path.read_bytes) -> list[str]:
-    """What has changed since a measurement: file names, or a reason in words; empty if nothing."""
-    if not is_kept(name):
-        return ["never measured"]
-    record = load(name)
-    if record["code"] is None:
-        return ["measured before the code was recorded"]
-    now, before = code_behind(name, read), record["code"]
-    changed = sorted(path for path in now | before if now.get(path) != before.get(path))
-    if INDEX.exists() and meshes_behind(name) != record["meshes"]:
-        changed.append("the list of meshes")
-    return changed
+def code_behind(name: str) -> str:
+    """Digest of the code that determines the results of a measurement.
 
-
-def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
-    """Digest of each file whose statements determine the results of a measurement.
-
-    In the measurement's own module, only the statements that `measure` reaches count, so changing
-    the wording of a section does not make the measurement stale. In the modules imported from
-    there, directly or indirectly, all statements count. Comments and docstrings never do, nor do
-    the folders of the core that the measurement lists in `WITHOUT`.
-
-    Parameters
-    ----------
-    name : str
-        Name of the measurement.
-    read : callable
-        Function that returns the content of a file.
-
-    Returns
-    -------
-    dict of str to str
-        Digest by path relative to the repository.
+    It covers the statements of the measurement's module that `measure` uses, so that wording does
+    not count; the modules that measurements share; the compiled kernels; and of the core the
+    modules at its top and the folders that the measurement names as its `ROOMS`, by default all.
+    Comments and docstrings do not count.
     """
     own = ROOT / "benchmarks" / f"{name}.py"
-    statements, imports = _reached(_parsed(read(own)), "measure")
-    excluded = getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
-    digests = {_relative(own): _digest(statements)}
-    waiting = list(_files(imports, own))
-    while waiting:
-        path = waiting.pop()
-        relative = _relative(path)
-        room = relative.split("/")[1] if relative.startswith("nicmm_core/") else ""
-        if relative in digests or relative in PRESENTATION or room in excluded:
-            continue
-        digests[relative], imported = _whole(read(path), path)
-        waiting += imported
-    if "nicmm_core/geometry/mesh.py" in digests:  # the first module that uses the kernels
-        for path in sorted([*KERNELS.glob("source/*.[ch]"), *KERNELS.glob("nicmm_kernels/*.py")]):
-            digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
-    if "paper" not in excluded:
-        for path in sorted((ROOT / WEIGHTS).iterdir()):
-            if path.is_file() and path.suffix != ".py":
-                digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
-    return dict(sorted(digests.items()))
-
-
-def meshes_behind(name: str) -> str | None:
-    """Digest of the list of third-party meshes; None if a measurement uses no such mesh."""
-    modules = {"tests/oracles/mesh_files.py", "benchmarks/collections.py"}
-    if not INDEX.exists() or not modules & set(code_behind(name)):
-        return None
-    return hashlib.sha256(INDEX.read_bytes()).hexdigest()[:16]
-
-
-IMPORTS = (ast.Import, ast.ImportFrom)
+    rooms = getattr(importlib.import_module(f"benchmarks.{name}"), "ROOMS", ("*",))
+    patterns = (
+        *("nicmm_core/*", *(f"nicmm_core/{room}/**/*" for room in rooms)),
+        *("kernels/source/*", "kernels/nicmm_kernels/*", "tests/oracles/*"),
+    )
+    files = {file for pattern in patterns for file in ROOT.glob(pattern)}
+    files.update(
+        file
+        for file in own.parent.glob("*.py")
+        if file.stem not in PRESENTATION and b"\ndef measure(" not in file.read_bytes()
+    )
+    counted = sorted(file for file in files if file.suffix in SOURCES)
+    digests = [_statements_of_measure(own.read_bytes()), *map(_digest, counted)]
+    return hashlib.sha256("".join(digests).encode()).hexdigest()[:16]
 
 
 @cache
-def _whole(content: bytes, path: Path) -> tuple[str, list[Path]]:
-    """Digest of all statements of a file, and the files of the project that it imports."""
-    tree = _parsed(content)
-    imports = [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
-    return _digest([tree]), _files(imports, path)
+def _digest(file: Path) -> str:
+    """Digest of a file; that of a module is one of its statements."""
+    content = file.read_bytes()
+    if file.suffix == ".py":
+        content = ast.dump(_parsed(content)).encode()
+    return hashlib.sha256(content).hexdigest()
 
 
 def _parsed(content: bytes) -> ast.Module:
-    """Syntax tree of a file without docstrings; it has no comments anyway."""
+    """A module without docstrings."""
     tree = ast.parse(content)
     for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            node.body = [each for each in node.body if not _is_text(each)]
     return tree
 
 
@@ -212,73 +174,25 @@ def _is_text(node: ast.stmt) -> bool:
     )
 
 
-def _digest(statements: Sequence[ast.AST]) -> str:
-    text = "\n".join(ast.dump(statement) for statement in statements)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _reached(tree: ast.Module, start: str) -> tuple[list[ast.stmt], list[ast.stmt]]:
-    """Statements that a function of a module uses, in file order, and the imports they need."""
+@cache
+def _statements_of_measure(content: bytes) -> str:
+    """The statements that the function `measure` of a module uses, except imports."""
     defined: dict[str, list[ast.stmt]] = {}
-    for statement in tree.body:
+    for statement in _parsed(content).body:
         for name in _names_defined(statement):
             defined.setdefault(name, []).append(statement)
-    found: set[ast.stmt] = set()
-    waiting = [start]
-    seen = set()
+    found, waiting = {}, ["measure"]
     while waiting:
         name = waiting.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        for statement in defined.get(name, ()):
-            found.add(statement)
-            waiting += [node.id for node in ast.walk(statement) if isinstance(node, ast.Name)]
-    statements = [each for each in tree.body if each in found and not isinstance(each, IMPORTS)]
-    inner = [n for each in statements for n in ast.walk(each) if isinstance(n, IMPORTS)]
-    outer = [each for each in tree.body if each in found and isinstance(each, IMPORTS)]
-    used = [_only(node, seen) for node in outer]
-    return statements, [*used, *inner]
-
-
-def _only(node: ast.stmt, names: set[str]) -> ast.stmt:
-    """Copy of an import statement with only the names that are used."""
-    assert isinstance(node, IMPORTS)
-    kept = [each for each in node.names if (each.asname or each.name).split(".")[0] in names]
-    if isinstance(node, ast.Import):
-        return ast.Import(kept)
-    return ast.ImportFrom(node.module, kept, node.level)
+        if name in defined and name not in found:
+            found[name] = defined[name]
+            used = (node for each in defined[name] for node in ast.walk(each))
+            waiting += [node.id for node in used if isinstance(node, ast.Name)]
+    return "".join(ast.dump(each) for name in sorted(found) for each in found[name])
 
 
 def _names_defined(statement: ast.stmt) -> list[str]:
     if isinstance(statement, ast.FunctionDef | ast.ClassDef):
         return [statement.name]
-    if isinstance(statement, IMPORTS):
-        return [(each.asname or each.name).split(".")[0] for each in statement.names]
     nodes = [node for node in ast.walk(statement) if isinstance(node, ast.Name)]
     return [node.id for node in nodes if isinstance(node.ctx, ast.Store)]
-
-
-def _files(imports: Iterable[ast.stmt], importer: Path) -> list[Path]:
-    """Files of the project that import statements load, including the enclosing packages."""
-    found = []
-    package = _relative(importer).split("/")[:-1]
-    for node in imports:
-        if isinstance(node, ast.Import):
-            wanted = [each.name.split(".") for each in node.names]
-        else:
-            assert isinstance(node, ast.ImportFrom)
-            base = package[: len(package) - node.level + 1] if node.level else []
-            base = base + (node.module.split(".") if node.module else [])
-            wanted = [base, *([*base, each.name] for each in node.names)]
-        for parts in wanted:
-            for count in range(1, len(parts) + 1):
-                place = ROOT.joinpath(*parts[:count])
-                found += [
-                    p for p in (place / "__init__.py", place.with_suffix(".py")) if p.exists()
-                ]
-    return found
-
-
-def _relative(path: Path) -> str:
-    return path.relative_to(ROOT).as_posix()

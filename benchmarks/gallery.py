@@ -20,13 +20,13 @@ from nicmm_core.io.files import read_mesh
 from tests.oracles.mesh_files import mesh_files
 
 from . import collections, renders, report
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .lanes import lane_beside
 from .methods import METHODS
 from .scale import Scale
 
 TITLE = "Gallery: alignment and obstacles (Fig. 13, 14, 15)"
-WITHOUT = ("outputs", "splines")
+ROOMS = EVERY_METHOD
 
 SEED = 16
 METHOD = METHODS[0]

@@ -22,7 +22,7 @@ from tests.oracles.named_curves import named_curves
 
 from . import collections, plots, report
 from .elastic_curve import NODES, elastic_curve
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .measures import SAMPLES, bending, squared_curvature
 from .parallel import in_processes
 from .progress import resumed
@@ -30,6 +30,7 @@ from .samples import point_sets
 from .scale import Scale
 
 TITLE = "The guarantee and fairness, checked independently"
+ROOMS = DESIGN
 
 METHOD = "elastic"
 SEED = 0

@@ -22,11 +22,10 @@ from nicmm_core.paper.signed_distance import heat_distance
 from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, renders, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .polylines import initial_path
 from .scale import Scale
 from .solving import (
-    PARTS_WITHOUT,
     Sample,
     designed_curve,
     random_field,
@@ -37,7 +36,7 @@ from .solving import (
 )
 
 TITLE = "Sensitivity to the initial loop (Fig. 6)"
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 6
 RANDOM_SEED = 16

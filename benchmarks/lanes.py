@@ -24,13 +24,13 @@ from nicmm_core.relaxation.discrete_curve import shifted
 from tests.oracles.checker import judge
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Lanes to follow"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 4
 

@@ -14,7 +14,7 @@ from tests.oracles.isolation import isolated_beside
 from tests.oracles.messes import MOST_POINTS, MOST_WELDED, SEED, WRONG, answer, most_faces
 
 from . import report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .progress import resumed
 from .scale import Scale
 
@@ -31,6 +31,7 @@ LISTED = 40
 
 
 TITLE = "Random non-manifold meshes"
+ROOMS = DESIGN
 
 
 def measure(scale: Scale) -> Results:

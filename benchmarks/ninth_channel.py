@@ -19,13 +19,13 @@ from nicmm_core.paper.training_maps import random_maps
 from nicmm_core.paper.weights_file import load_network, shipped_network
 
 from . import collections, plots, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .samples import random_sets
 from .scale import Scale
-from .solving import PARTS_WITHOUT, Sample, run_networks
+from .solving import Sample, run_networks
 
 TITLE = "The ninth input channel, φ_fea (section 3.3)"
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 17
 ITERATIONS = 20

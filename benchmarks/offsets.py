@@ -17,12 +17,12 @@ from nicmm_core.geometry.segment_distances import SegmentDistances, segments_of
 from nicmm_core.geometry.surface_points import SurfacePoints, nearest_points
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Offsets"
-WITHOUT = ("paper",)
+ROOMS = (*DESIGN, "offsets")
 TIMED = True
 
 SEED = 47

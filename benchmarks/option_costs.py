@@ -14,14 +14,14 @@ from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 from .several_curves import drawn
 from .symmetry import symmetric_body
 
 TITLE = "What options cost"
-WITHOUT = ("outputs", "paper")
+ROOMS = DESIGN
 TIMED = True
 
 SEED = 461

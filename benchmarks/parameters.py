@@ -15,11 +15,10 @@ from nicmm_core.paper.solution import Solution
 from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, renders, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .measures import bending
 from .scale import Scale
 from .solving import (
-    PARTS_WITHOUT,
     Sample,
     designed_curve,
     random_samples,
@@ -29,7 +28,7 @@ from .solving import (
 )
 
 TITLE = "Weights of the energy (Fig. 5)"
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 4
 

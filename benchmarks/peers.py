@@ -13,7 +13,7 @@ from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, renders, report
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .measures import bending
 from .methods import METHODS
 from .peer_sizes import measured_sizes, sizes_section
@@ -24,7 +24,7 @@ from .scale import Scale
 
 TITLE = "Other systems (Fig. 9)"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = EVERY_METHOD
 
 SEED = 7
 

@@ -1,6 +1,6 @@
 """Keeps the results of an unfinished measurement, so that an interruption loses little.
 
-The file of a measurement holds a fingerprint of its code, and then pairs of a result and the
+The file of a measurement holds the digest of its code, and then pairs of a result and the
 seconds until then. Results of other code are not used.
 """
 
@@ -53,7 +53,7 @@ def resumed(
     FOLDER.mkdir(parents=True, exist_ok=True)
     rewritten = _file(name).with_suffix(".part")  # an interrupted run may end within a record
     with rewritten.open("wb") as file:
-        for record in (_fingerprint(name), *pairs):
+        for record in (evidence.code_behind(name), *pairs):
             pickle.dump(record, file)
     rewritten.replace(_file(name))
     with _file(name).open("ab") as file:
@@ -81,17 +81,13 @@ def _read(name: str) -> list[tuple[Any, float]]:
     if not _file(name).exists():
         return pairs
     with _file(name).open("rb") as file:
-        if pickle.load(file) != _fingerprint(name):
+        if pickle.load(file) != evidence.code_behind(name):
             return pairs
         # The last record may be incomplete.
         with contextlib.suppress(EOFError, pickle.UnpicklingError):
             while True:
                 pairs.append(pickle.load(file))
     return pairs
-
-
-def _fingerprint(name: str) -> tuple[dict[str, str], str | None]:
-    return evidence.code_behind(name), evidence.meshes_behind(name)
 
 
 def _file(name: str) -> Path:

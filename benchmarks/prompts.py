@@ -30,12 +30,12 @@ from nicmm_core.relaxation.discrete_curve import DiscreteCurve
 from nicmm_core.relaxation.elastic_energy import bending_energy
 
 from . import evidence, prompt_bodies, renders, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .polylines import NearestPoints
 from .scale import Scale
 
 TITLE = "Prompts as people give them"
-WITHOUT = ("outputs", "splines")
+ROOMS = DESIGN
 
 WEIGHTS = (0.0, 0.1, 0.3, 1.0)
 """Values of `normal_bending` that are compared."""

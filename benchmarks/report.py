@@ -6,7 +6,7 @@ A measurement is a module of this package that defines
 - `measure(scale)`, which returns the results in JSON types,
 - `section(results)`, which returns them as Markdown,
 - `draw(results, folder)`, if there are plots: it writes the PNG files that `section` shows,
-- `WITHOUT`, the folders of the core that it never runs, if there are any,
+- `ROOMS`, the folders of the core that its results depend on, by default all,
 - `TIMED`, true if other work on the machine would change the results.
 """
 
@@ -62,7 +62,7 @@ def section_text(name: str, record: Record) -> str:
     """Section of a measurement, generated from its data."""
     module = importlib.import_module(f"benchmarks.{name}")
     results = record["results"]
-    body = results["text"] if record["code"] is None else module.section(results)
+    body = module.section(results)
     origin = f"`{record['command']}` · {record['machine']}"
     return f"<!-- {name} -->\n## {module.TITLE}\n\n{origin}\n\n{body.strip()}\n<!-- /{name} -->\n"
 
@@ -70,7 +70,7 @@ def section_text(name: str, record: Record) -> str:
 def draw(name: str, record: Record, scale: Scale) -> None:
     """Draw the plots of a measurement from its data."""
     module = importlib.import_module(f"benchmarks.{name}")
-    if record["code"] is not None and hasattr(module, "draw"):
+    if hasattr(module, "draw"):
         module.draw(record["results"], figures_folder(scale))
 
 

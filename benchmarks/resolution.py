@@ -18,7 +18,7 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.distances import distances
 
 from . import collections, plots, renders, report
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .measures import bending
 from .methods import METHODS
 from .polylines import NearestPoints
@@ -27,7 +27,7 @@ from .scale import Scale
 
 TITLE = "Resolution (bottom of Fig. 12)"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = EVERY_METHOD
 
 SEED = 4
 

@@ -13,7 +13,7 @@ from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, plots, report
-from .evidence import Results
+from .evidence import EVERY_METHOD, Results
 from .measures import bending
 from .methods import METHODS
 from .samples import random_sets
@@ -21,7 +21,7 @@ from .scale import Scale
 
 TITLE = "Running time (Table 5)"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = EVERY_METHOD
 
 SEED = 5
 

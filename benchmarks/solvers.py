@@ -19,14 +19,14 @@ from nicmm_core.paper.weights_file import load_network
 
 from . import collections, report
 from .adamw import AdamWConfig, fit_by_adamw
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .measures import SAMPLES, bending
 from .scale import Scale
-from .solving import PARTS_WITHOUT, Sample, designed_curve, random_samples, significant
+from .solving import Sample, designed_curve, random_samples, significant
 
 TITLE = "Solvers of the level set"
 TIMED = True
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 18
 

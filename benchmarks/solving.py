@@ -34,9 +34,6 @@ from .evidence import Results
 from .measures import diagonal
 from .samples import random_sets
 
-PARTS_WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "splines")
-"""Folders of the core that nothing in this module runs, for the `WITHOUT` of a measurement."""
-
 DIGITS = 6
 """Significant digits that are kept in results."""
 

@@ -29,12 +29,12 @@ from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 
 from . import report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .scale import Scale
 
 TITLE = "Where the time goes"
 TIMED = True
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 0
 SIZES = ((500, 2), (1000, 3), (1500, 5))

@@ -15,12 +15,12 @@ from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Strokes"
-WITHOUT = ("paper",)
+ROOMS = (*DESIGN, "strokes")
 TIMED = True
 
 SEED = 53

@@ -23,11 +23,11 @@ from nicmm_core.relaxation.simple_curve import simple_curve
 from nicmm_core.relaxation.warm_start import WARM
 
 from . import report
-from .evidence import Results
+from .evidence import DESIGN, Results
 from .scale import Scale
 
 TITLE = "Symmetric requests"
-WITHOUT = ("outputs",)
+ROOMS = DESIGN
 
 SEED = 19
 

@@ -11,12 +11,12 @@ from nicmm_core.paper.network import initial_network
 from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .scale import Scale
-from .solving import PARTS_WITHOUT, random_samples, run_networks, train
+from .solving import random_samples, run_networks, train
 
 TITLE = "Pretraining on one mesh, test on others (Table 2)"
-WITHOUT = PARTS_WITHOUT
+ROOMS = NETWORK
 
 SEED = 9
 TEST_SEED = 10

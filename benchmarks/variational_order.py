@@ -11,12 +11,12 @@ from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.paper.variational import CONVERGENCE, solve
 
 from . import collections, plots, report
-from .evidence import Results
+from .evidence import NETWORK, Results
 from .scale import Scale
-from .solving import PARTS_WITHOUT, random_samples, significant
+from .solving import random_samples, significant
 
 TITLE = "Order of convergence of the variational method"
-WITHOUT = (*PARTS_WITHOUT, "repair")
+ROOMS = NETWORK
 
 SEED = 0
 NOISE = 1e-3

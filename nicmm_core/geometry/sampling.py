@@ -65,11 +65,10 @@ def spread_vertices(
     scaled = np.concatenate(
         [mesh.vertices[candidates] / distance, normal_weight * normals[candidates]], axis=1
     )
-    near = cKDTree(scaled).query_ball_point(scaled, 1.0)
-    free = np.ones(len(candidates), dtype=bool)
+    tree, free = cKDTree(scaled), np.ones(len(candidates), dtype=bool)
     chosen = []
-    for place, around in enumerate(near):
-        if free[place]:
-            chosen.append(place)
-            free[around] = False
+    for number, place in enumerate(scaled):
+        if free[number]:
+            chosen.append(number)
+            free[tree.query_ball_point(place, 1.0)] = False
     return np.sort(candidates[chosen])
