@@ -21,6 +21,8 @@ from . import report
 from .evidence import DESIGN, Results
 from .scale import Scale
 
+SOUP = "the same, a soup of triangles"
+
 TITLE = "Cancelling"
 TIMED = True
 ROOMS = DESIGN
@@ -101,6 +103,21 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    designs = results["designs"]
+    small = max(each["longest"] for each in designs if each["faces"] <= 100_000)
+    large = max(each["faces"] for each in designs)
+    longest = max(d["longest"] for d in designs if d["faces"] == large and d["mesh"] != SOUP)
+    soup = next(each["longest"] for each in designs if each["mesh"] == SOUP)
+    return report.item(
+        f"A design checks for cancellation at least every {small:.2f} seconds of processor time on "
+        f"meshes of up to 100,000 faces, every {longest:.2f} seconds at {large / 1e6:.1f} million "
+        f"faces, and every {soup:.2f} seconds on a soup of as many triangles "
+        "([measured](../benchmarks/RESULTS.md#cancelling))."
+    )
+
+
 def _designed(
     name: str, mesh: nicmm.Mesh, points: IntArray | FloatArray, arguments: dict[str, Any]
 ) -> Results:
@@ -162,7 +179,7 @@ def _requests(
     yield "the same, an obstacle", mesh, _drawn(mesh, 5), maps
     corners = mesh.vertices[mesh.faces].reshape(-1, 3)
     soup = nicmm.Mesh(corners, np.arange(len(corners)).reshape(-1, 3))
-    yield "the same, a soup of triangles", soup, _drawn(soup, 5), {"order": "shortest"}
+    yield SOUP, soup, _drawn(soup, 5), {"order": "shortest"}
     ball = shapes.sphere(scale.choose(6, 5, 3))
     needles = nicmm.Mesh(ball.vertices * [1.0, 1.0, 1e-7], ball.faces)
     yield "needles", needles, _drawn(needles, 5), {"order": "shortest"}

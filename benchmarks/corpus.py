@@ -36,6 +36,10 @@ PATIENCE = 1200.0
 """Wall-clock time in seconds after which a request counts as hanging."""
 
 LISTED = 60
+
+SMALL = 20_000
+"""Number of faces below which the documents tell the slowest request."""
+
 SLOWEST = 8
 
 KIND = {True: "closed", False: "open"}
@@ -85,6 +89,23 @@ def section(results: Results) -> str:
         + "\nThe slowest requests: "
         + report.listed(f"{_name(each)} {each['seconds']:.0f} s" for each in slowest)
         + "."
+    )
+
+
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    answers = results["answers"]
+    meshes = len({(each["folder"], each["mesh"]) for each in answers})
+    counts = Counter(each["verdict"] for each in answers)
+    slowest = max(each["seconds"] for each in answers if each["faces"] < SMALL)
+    return report.item(
+        "`python -m benchmarks corpus`, every kind of broken mesh (self-crossing, non-manifold, "
+        "with reversed faces, degenerate, in pieces, huge): "
+        f"of {len(answers):,} requests on {meshes} meshes {counts[GOOD]:,} curves are good, "
+        f"{counts[DUE]} are impossible and refused with an error that says why. "
+        f"{report.none_or(counts[DECLINED]).capitalize()} refused although possible, and "
+        f"{report.none_or(counts[WRONG])} wrong. Below "
+        f"{SMALL:,} faces the slowest takes {slowest:.1f} seconds."
     )
 
 

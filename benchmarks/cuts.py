@@ -67,6 +67,18 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    cuts = [each for each in results["answers"] if "refused" not in each]
+    sound = sum(not each["faults"] for each in cuts)
+    meshes = len({(each["meshes"], each["mesh"]) for each in cuts})
+    return report.item(
+        "A manifold stays a manifold: faces do not overlap, there are no holes, and boundaries do "
+        f"not move (`python -m benchmarks cuts`: {sound} of {len(cuts)} cuts on {meshes} "
+        "third-party meshes)."
+    )
+
+
 def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.Mesh]]]]:
     if scale is Scale.SMOKE:
         yield "generated creatures", collections.creatures(1)

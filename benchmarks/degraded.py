@@ -104,6 +104,21 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    means = [
+        np.median([s["answers"]["elastic"]["offset"][0] for s in results["sets"] if s["n"] == n])
+        for n in results["severities"]
+        if n
+    ]
+    return report.item(
+        "The curve on a degraded mesh is smooth too, but not always the same: by severity, the "
+        f"median of its mean distance from the clean mesh's curve is {min(means):.1f} to "
+        f"{max(means):.1f} % of the diagonal "
+        "([measured](../benchmarks/RESULTS.md#what-moves-a-curve-on-degraded-meshes))."
+    )
+
+
 def draw(results: Results, folder: Path) -> None:
     """Plot the distances to the curves on the clean meshes."""
     methods = results["methods"]

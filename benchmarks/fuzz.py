@@ -6,6 +6,7 @@ in a separate process, so that crashes, hangs and output from below Python are f
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 
 from tests.oracles.hostile_input import SEED, Answer, answer
@@ -87,6 +88,23 @@ def section(results: Results) -> str:
         + "\n"
         + report.table(("input", "cases", "outcomes"), rows)
     )
+
+
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    slow = sum(re.search(r": took \d+ s$", finding) is not None for finding in results["findings"])
+    others = report.none_or(len(results["findings"]) - slow, be="")
+    text = (
+        f"`python -m benchmarks fuzz`, hostile input: of {results['cases']:,} cases {others} ended "
+        "with a crash, a hang, several curves "
+        "or an error of another package."
+    )
+    if slow:
+        text += (
+            f" {slow} took more than {SLOW:g} seconds of CPU time, at most "
+            f"{results['slowest']:.1f}."
+        )
+    return report.item(text)
 
 
 def _faults(done: Isolated[int, Answer]) -> list[str]:

@@ -51,6 +51,9 @@ SHARES = (0.25, 0.5, 0.75, 0.9)
 
 LISTED_FAULTS = 20
 
+AROUND = "around a torus, the handles of a double torus, a Möbius strip, a hole"
+"""Where the named curves run."""
+
 NAMED = "named curves"
 """Collection whose points are not random; it is left out of the distributions."""
 
@@ -120,6 +123,44 @@ def section(results: Results) -> str:
             "Share of the sets whose bending is at most the given multiple of that of the "
             "reference curve",
         )
+    )
+
+
+def summary(results: Results) -> str:
+    """What the documents say of the guarantee."""
+    rows = []
+    for label in dict.fromkeys(each["collection"] for each in results["meshes"]):
+        meshes = [each for each in results["meshes"] if each["collection"] == label]
+        curves = [curve for each in meshes for curve in each["curves"]]
+        good = sum("error" not in curve and "faults" not in curve for curve in curves)
+        share = f"{good} ({100 * good / len(curves):.4g} %)"
+        words = AROUND if label == NAMED else label
+        rows.append((words, len(meshes), len(curves), share, len(curves) - good))
+    one = "one simple curve through all points, in order"
+    header = ("surfaces", "meshes", "curves", one, "anything else")
+    return report.table(header, rows)
+
+
+def fairness(results: Results) -> str:
+    """What the documents say of the bending, relative to the fairest reference curve."""
+    words = []
+    for closed in (True, False):
+        ratios = [
+            curve["to_best"][-1]
+            for each in results["meshes"]
+            for curve in each["curves"]
+            if curve["closed"] is closed and curve.get("to_best", [None])[-1] is not None
+        ]
+        half, most, nearly_all = np.percentile(ratios, [50, 75, 90])
+        words.append(
+            f"the median over {len(ratios)} {KIND[closed]} curves is {half:.2f}; 75 % are "
+            f"within {most:.2f} and 90 % within {nearly_all:.2f}"
+        )
+    return report.paragraph(
+        "The curves pass through the control points to the last digit. On every "
+        f"{results['compared_every']}th mesh, the bending L ∫ κ_g² ds (length L, geodesic "
+        "curvature κ_g) was divided by that of the fairest explicit elastic curve known through "
+        "the same points: " + "; ".join(words) + "."
     )
 
 

@@ -30,6 +30,13 @@ TOLD = 500
 LISTED = 40
 
 
+OUTCOMES = {
+    "good curve": "good curves",
+    "error where due": "correct refusals, since no curve exists",
+    "another order named": "refusals that name an order that works",
+}
+"""Outcomes that are right, in words."""
+
 TITLE = "Random non-manifold meshes"
 ROOMS = DESIGN
 
@@ -93,4 +100,18 @@ def section(results: Results) -> str:
         + "".join(f"- {finding}\n" for finding in results["findings"][:LISTED])
         + "\n"
         + report.table(("outcome", "meshes", "share"), rows)
+    )
+
+
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    outcomes, seconds = results["outcomes"], results["seconds"]
+    counted = report.listed(
+        f"{outcomes.get(name, 0):,} {words}" for name, words in OUTCOMES.items()
+    )
+    wrong = report.none_or(len(results["findings"]))
+    return report.item(
+        "`python -m benchmarks messes`, surfaces whose vertices are welded at random, with faces "
+        f"added, duplicated, reversed and removed: of {len(seconds):,} requests {counted}; "
+        f"{wrong} wrong. The slowest takes {max(seconds):.1f} seconds."
     )

@@ -70,6 +70,25 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    found = [each["detour"] for each in results["sets"] if each["detour"] is not None]
+    good = sum(not each["entered"] and not each["faults"] for each in found)
+    text = (
+        "`python -m benchmarks obstacles` paints discs of "
+        f"{200 * results['radius']:g} % of the diagonal on the free curve of "
+        f"{len(results['sets'])} third-party meshes: {good} curves go around the disc, each as one "
+        "simple loop without any length inside"
+    )
+    if good < len(found):
+        text += f"; {len(found) - good} do not"
+    text += "."
+    if len(found) < len(results["sets"]):
+        closed_off = len(results["sets"]) - len(found)
+        text += f" On {closed_off} of the meshes the disc closes off a limb, and the error says so."
+    return report.paragraph(text)
+
+
 def _detour(name: str, mesh: Mesh, points: IntArray) -> Results | None:
     """Curve with a disc on the free one, relative to it; None if an error says there is none."""
     free = nicmm.design_curve(mesh, points, order="shortest")

@@ -116,6 +116,11 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of the measured systems."""
+    return f"{systems_table(results)}\n\n{sizes_section(results['sizes'])}"
+
+
 def _ours(mesh: Mesh, points: IntArray, method: str, curves: dict[str, SurfaceCurve]) -> Results:
     """Answer of one of our methods; if it is a single curve, it is added to ``curves``.
 

@@ -320,6 +320,11 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    return report.paragraph(cost(results))
+
+
 def cost(results: Results) -> str:
     """CPU time of a curve with `COST_OF` relative to one without normal bending, in words."""
     at = WEIGHTS.index(COST_OF)

@@ -5,6 +5,7 @@ A measurement is a module of this package that defines
 - `TITLE`, which names the corresponding table or figure of the paper,
 - `measure(scale)`, which returns the results in JSON types,
 - `section(results)`, which returns them as Markdown,
+- `summary(results)`, if a page of docs/ quotes it: it returns that block of Markdown,
 - `draw(results, folder)`, if there are plots: it writes the PNG files that `section` shows,
 - `ROOMS`, the folders of the core that its results depend on, by default all,
 - `TIMED`, true if other work on the machine would change the results.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -122,6 +124,30 @@ def verdicts(section: str) -> dict[str, list[str]]:
 def figure(file_name: str, caption: str) -> str:
     """Markdown picture with its caption."""
     return f"![{caption}](figures/{file_name})\n\n*{caption}*"
+
+
+def item(text: str) -> str:
+    """Item of a list, in lines of a document."""
+    return _wrapped(text, "- ", "  ")
+
+
+def paragraph(text: str) -> str:
+    """Paragraph, in lines of a document."""
+    return _wrapped(text)
+
+
+def _wrapped(text: str, first: str = "", others: str = "") -> str:
+    """Text in lines of 118 characters, without breaks inside of code."""
+    whole = re.sub(r"`[^`]*`", lambda code: code[0].replace(" ", "\0"), text)
+    lines = textwrap.fill(
+        whole, 118, initial_indent=first, subsequent_indent=others, break_on_hyphens=False
+    )
+    return lines.replace("\0", " ")
+
+
+def none_or(count: int, be: str = " was") -> str:
+    """A number with its verb: "none was", "1 was", "2 were"."""
+    return f"{count or 'none'}{be if count < 2 else be.replace('was', 'were')}"
 
 
 def listed(names: Iterable[str]) -> str:

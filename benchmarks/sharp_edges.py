@@ -117,6 +117,23 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    every = [line for lines in results["lines"].values() for line in lines]
+    others = [line["mesh"] for line in every if line["aligned"] > WANTED]
+    kinds = sorted({name.split(", ")[-1].rstrip(" 0123456789") for name in others})
+    where = f"; the other {len(others)} are on: {report.listed(kinds)}" if kinds else ""
+    return report.item(
+        "A curve whose ends are 2 % of the diagonal away from a sharp edge is attracted to the "
+        f"edge and runs along it: of {len(every)} "
+        "[measured](../benchmarks/RESULTS.md#sharp-edges-to-follow) lines, "
+        f"{len(every) - len(others)} are within a quarter of a mesh edge of it{where}. If other "
+        "sharp edges are about as near, such as a neighbouring rim of a shaft or the other half of "
+        "a circle, the curve may follow those; "
+        "[via points](via_points.md) select one."
+    )
+
+
 def _row(label: str, lines: Sequence[Results]) -> tuple[object, ...]:
     after = [line["aligned"] for line in lines]
     return (

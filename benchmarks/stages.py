@@ -148,6 +148,20 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    body = results["bodies"][-1]
+    first, another, dragged = (
+        np.median(body["milliseconds"][kind]["together"]) / 1000.0
+        for kind in ("first", "another", "dragged")
+    )
+    return report.item(
+        f"On a mesh of {body['faces'] / 1e6:.1f} million faces the first curve takes {first:.1f} "
+        f"seconds, a further curve {another:.1f} seconds, and an update while a point is dragged "
+        f"{dragged:.2f} seconds ([by stage](../benchmarks/RESULTS.md#where-the-time-goes))."
+    )
+
+
 def _table(columns: dict[str, Times], digits: int) -> str:
     stages = next(iter(columns.values()))
     rows = [

@@ -70,6 +70,22 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    runs, iterations = results["runs"], results["iterations"]
+    names = {
+        UNTRAINED: "before training, which returns φ₀",
+        ONE_MESH: f"pretrained on one mesh ({results['training_seconds']:.0f} s)",
+        SHIPPED: "`nicmm.npz`",
+    }
+    rows = [
+        (name, f"{runs[label]['mean_losses'][0]:.3f}", f"{np.mean(runs[label]['last_losses']):.3f}")
+        for label, name in names.items()
+    ]
+    header = ("network", "start of the fit", f"after {iterations} iterations")
+    return report.table(header, rows)
+
+
 def draw(results: Results, folder: Path) -> None:
     """Plot the losses against the iteration."""
     plots.least_losses(

@@ -1,6 +1,7 @@
-"""Tests data files with their fingerprints, the generated documents, and the command `all`."""
+"""Tests data files with their digests, the generated documents, and the command `all`."""
 
 import importlib
+import shutil
 
 import pytest
 
@@ -8,27 +9,6 @@ from benchmarks import __main__ as command
 from benchmarks import documents, evidence, report
 from benchmarks.__main__ import MEASUREMENTS
 from benchmarks.scale import Scale
-
-RELAXATION = evidence.ROOT / "nicmm_core" / "relaxation" / "relaxing.py"
-
-
-def changed(path, extra):
-    """Function that reads files of the project, one of them with an addition at its end."""
-
-    def read(asked):
-        return asked.read_bytes() + (extra.encode() if asked == path else b"")
-
-    return read
-
-
-def affected(path, extra):
-    """Measurements whose fingerprint changes when a file gets an addition."""
-    read = changed(path, extra)
-    return {
-        name
-        for name in MEASUREMENTS
-        if evidence.code_behind(name, read) != evidence.code_behind(name)
-    }
 
 
 def test_documents_are_those_that_the_data_give():
@@ -40,49 +20,70 @@ def test_documents_are_those_that_the_data_give():
         )
 
 
-@pytest.mark.slow
-def test_a_statement_asks_for_new_measurements_where_it_is_run_only():
-    without = {
-        name
-        for name in MEASUREMENTS
-        if "relaxation" in getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
-    }
-    assert {"pretraining", "transfer"} <= without
-    found = affected(RELAXATION, "\nMORE = 1\n")
-    assert {"courses", "runtime", "messes"} <= found
-    assert found == set(MEASUREMENTS) - without
-
-
-@pytest.mark.slow
-def test_a_comment_asks_for_nothing():
-    read = changed(RELAXATION, "\n# More.\n")
-    assert evidence.code_behind("courses", read) == evidence.code_behind("courses")
-
-
-@pytest.mark.slow
-def test_wording_asks_for_nothing():
-    path = evidence.ROOT / "benchmarks" / "messes.py"
-
-    def reworded(asked):
-        text = asked.read_bytes()
-        return (
-            text.replace(b"in chains of these", b"one after the other") if asked == path else text
+@pytest.fixture
+def stale_after(tmp_path, monkeypatch):
+    """Function that changes a file of a copy of the sources, and names whose digest changes."""
+    for folder in ("nicmm_core", "kernels", "benchmarks", "tests/oracles"):
+        shutil.copytree(
+            evidence.ROOT / folder,
+            tmp_path / folder,
+            ignore=shutil.ignore_patterns("data", "figures", "quick", "__pycache__", "*.so"),
         )
+    monkeypatch.setattr(evidence, "ROOT", tmp_path)
+    before = {name: evidence.code_behind(name) for name in MEASUREMENTS}
 
-    assert evidence.code_behind("messes", reworded) == evidence.code_behind("messes")
+    def changed(file, change):
+        path = tmp_path / file
+        text = path.read_text(encoding="utf-8")
+        assert change(text) != text
+        path.write_text(change(text), encoding="utf-8")
+        evidence._digest.cache_clear()
+        return {name for name in MEASUREMENTS if evidence.code_behind(name) != before[name]}
 
-    def fewer(asked):
-        text = asked.read_bytes()
-        return text.replace(b"scale.choose(", b"1 + scale.choose(") if asked == path else text
-
-    assert evidence.code_behind("messes", fewer) != evidence.code_behind("messes")
+    yield changed
+    evidence._digest.cache_clear()
 
 
-def test_weights_and_oracles_count():
-    code = evidence.code_behind("messes")
-    assert "tests/oracles/checker.py" in code
-    assert any(path.startswith(evidence.WEIGHTS) for path in code)
-    assert not any(path.startswith("nicmm_blender") for path in code)
+def statement_added(text):
+    return text + "\nMORE = 1\n"
+
+
+def with_room(room):
+    """Measurements that depend on a folder of the core."""
+    modules = {name: importlib.import_module(f"benchmarks.{name}") for name in MEASUREMENTS}
+    return {n for n, module in modules.items() if room in getattr(module, "ROOMS", (room,))}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("file", "expected"),
+    [
+        ("nicmm_core/relaxation/relaxing.py", with_room("relaxation")),
+        ("nicmm_core/strokes/stretch.py", with_room("strokes")),
+        ("nicmm_core/improvement.py", set(MEASUREMENTS)),
+        ("kernels/source/tracing.c", set(MEASUREMENTS)),
+        ("benchmarks/samples.py", set(MEASUREMENTS)),
+        ("benchmarks/courses.py", set()),
+        ("benchmarks/plots.py", set()),
+    ],
+)
+def test_a_statement_asks_for_the_measurements_that_depend_on_it(stale_after, file, expected):
+    assert stale_after(file, statement_added) == expected
+
+
+@pytest.mark.slow
+def test_comments_and_wording_ask_for_nothing_and_samples_do(stale_after):
+    own = "benchmarks/messes.py"
+    comment = "\n# More.\n"
+    assert not stale_after("nicmm_core/improvement.py", lambda text: text + comment)
+    assert not stale_after(own, lambda t: t.replace("in chains of these", "one after the other"))
+    assert stale_after(own, lambda t: t.replace("scale.choose(", "1 + scale.choose(")) == {"messes"}
+
+
+def test_measurements_of_the_network_do_not_depend_on_the_search():
+    assert {"pretraining", "transfer"} <= with_room("paper") - with_room("courses")
+    assert {"courses", "runtime", "messes"} <= with_room("courses")
+    assert with_room("offsets") == {"offsets", "corpus", "fuzz"}
 
 
 @pytest.fixture
@@ -106,15 +107,17 @@ def fake(monkeypatch, begun, fails=(), interrupted=()):
 
 
 @pytest.mark.slow
-def test_stale_says_what_changed(kept, monkeypatch, capsys):
-    assert command.list_stale() == 1
-    assert capsys.readouterr().out == "messes: never measured\nfuzz: never measured\n"
+def test_stale_names_what_was_measured_with_other_code(kept, monkeypatch, capsys):
+    monkeypatch.setattr(command.sys, "argv", ["benchmarks", "stale"])
+    assert command.main() == 1
+    assert capsys.readouterr().out == "messes\nfuzz\n2 of 2 measurements are stale\n"
     for name in command.MEASUREMENTS:
         evidence.save(name, evidence.code_behind(name), {}, 1.0, Scale.FULL)
-    assert command.list_stale() == 0
-    assert capsys.readouterr().out == ""
-    read = changed(RELAXATION, "\nMORE = 1\n")
-    assert evidence.what_changed("messes", read) == ["nicmm_core/relaxation/relaxing.py"]
+    assert command.main() == 0
+    evidence.save("messes", "0" * 16, {}, 1.0, Scale.FULL)
+    capsys.readouterr()
+    assert command.main() == 1
+    assert capsys.readouterr().out == "messes\n1 of 2 measurements are stale\n"
 
 
 @pytest.mark.slow
@@ -122,19 +125,19 @@ def test_an_interrupted_run_goes_on_where_it_was(kept, monkeypatch):
     begun = []
     fake(monkeypatch, begun, interrupted=("fuzz",))
     with pytest.raises(KeyboardInterrupt):
-        command.measure_all(Scale.FULL, None, 1)
+        command.measure_all(Scale.FULL, 1)
     assert begun == ["messes", "fuzz"]
     fake(monkeypatch, begun)
-    command.measure_all(Scale.FULL, None, 1)
+    command.measure_all(Scale.FULL, 1)
     assert begun == ["messes", "fuzz", "fuzz"]
-    command.measure_all(Scale.FULL, None, 1)
+    command.measure_all(Scale.FULL, 1)
     assert begun == ["messes", "fuzz", "fuzz"]
 
 
 def test_a_failure_stops_nothing_else(kept, monkeypatch):
     begun = []
     fake(monkeypatch, begun, fails=("messes",))
-    assert command.measure_all(Scale.FULL, None, 2) == ["messes"]
+    assert command.measure_all(Scale.FULL, 2) == ["messes"]
     assert sorted(begun) == ["fuzz", "messes"]
     assert evidence.is_kept("fuzz") and not evidence.is_kept("messes")
 
@@ -144,18 +147,3 @@ def test_a_run_apart_keeps_its_output(monkeypatch, tmp_path):
     monkeypatch.setattr(command, "_log_of", lambda name: tmp_path / "log.txt")
     assert not command.run_apart("nothing", Scale.SMOKE)
     assert "invalid choice: 'nothing'" in (tmp_path / "log.txt").read_text()
-
-
-@pytest.mark.slow
-def test_nothing_is_begun_that_would_end_after_the_hours_given(kept, monkeypatch):
-    begun = []
-    fake(monkeypatch, begun)
-    command.measure_all(Scale.FULL, None, 1)
-    for name in command.MEASUREMENTS:
-        record = evidence.load(name)
-        record["code"] = None
-        (evidence.DATA / f"{name}.json").write_text(evidence.json.dumps(record))
-    command.measure_all(Scale.FULL, 1.0, 1)
-    assert begun == ["messes", "fuzz"]
-    command.measure_all(Scale.FULL, 3.0, 1)
-    assert begun == ["messes", "fuzz", "messes", "fuzz"]
