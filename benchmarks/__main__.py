@@ -42,6 +42,7 @@ MEASUREMENTS = (
     "degraded",
     "degraded_start",
     "search_effort",
+    "portfolio",
     "courses",
     "course_pictures",
     "prompts",

@@ -10,8 +10,8 @@ from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.elastic_energy import comparable_energies
 
 from . import collections, renders, report
-from .courses import without_courses
 from .evidence import DESIGN, Results
+from .portfolio import without_courses
 from .samples import random_sets
 from .scale import Scale
 

@@ -7,7 +7,8 @@ A measurement is a module of this package that defines
 - `section(results)`, which returns them as Markdown,
 - `summary(results)`, if a page of docs/ quotes it: it returns that block of Markdown,
 - `draw(results, folder)`, if there are plots: it writes the PNG files that `section` shows,
-- `ROOMS`, the folders of the core that its results depend on, by default all,
+- `ROOMS`, the folders of the core that its results depend on, by default all; None if they stay
+  true when the code changes,
 - `TIMED`, true if other work on the machine would change the results.
 """
 
