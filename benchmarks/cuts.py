@@ -83,7 +83,7 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
     if scale is Scale.SMOKE:
         yield "generated creatures", collections.creatures(1)
         return
-    yield "SHREC16, two Loop subdivisions", collections.shrec16(scale.choose(96, 8))
+    yield "SHREC16, two Loop subdivisions", collections.shrec16(scale.choose(48, 8))
     yield "closed manifold", collections.clean(scale.choose(36, 3))
 
 

@@ -81,8 +81,8 @@ def measure(scale: Scale) -> Results:
     if scale is Scale.SMOKE:
         meshes = collections.creatures(2)
     else:
-        some = collections.bodies(scale.choose(12, 2))
-        meshes = itertools.chain(collections.clean(scale.choose(36, 4)), some)
+        some = collections.bodies(scale.choose(6, 2))
+        meshes = itertools.chain(collections.clean(scale.choose(18, 4)), some)
     return {
         "seed": SEED,
         "width": WIDTH,

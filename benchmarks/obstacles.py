@@ -21,7 +21,6 @@ from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Obstacles (Fig. 14)"
-TIMED = True
 ROOMS = DESIGN
 
 SEED = 3

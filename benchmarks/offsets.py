@@ -23,7 +23,6 @@ from .scale import Scale
 
 TITLE = "Offsets"
 ROOMS = (*DESIGN, "offsets")
-TIMED = True
 
 SEED = 47
 

@@ -22,7 +22,6 @@ from .symmetry import symmetric_body
 
 TITLE = "What options cost"
 ROOMS = DESIGN
-TIMED = True
 
 SEED = 461
 

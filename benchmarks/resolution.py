@@ -26,8 +26,8 @@ from .samples import random_sets
 from .scale import Scale
 
 TITLE = "Resolution (bottom of Fig. 12)"
-TIMED = True
 ROOMS = EVERY_METHOD
+TIMED = True
 
 SEED = 4
 

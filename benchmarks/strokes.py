@@ -21,7 +21,6 @@ from .scale import Scale
 
 TITLE = "Strokes"
 ROOMS = (*DESIGN, "strokes")
-TIMED = True
 
 SEED = 53
 
