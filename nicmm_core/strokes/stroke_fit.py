@@ -8,7 +8,8 @@ The stroke is smoothed by a spline, and control points are places on it:
    stroke, which is fast and keeps its course. Where it leaves the tolerance, a control point is
    added, until it does not.
 3. The curve through these is designed without a start, as the caller will do. If it takes another
-   course, control points are added there. If that does not help, the first guess is tried instead.
+   course, control points are added there. If that does not help, the first guess is tried instead,
+   and then with further points where lines between them turn much.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from ..geometry.tolerances import COINCIDENT
 from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from ..path.spline_path import interpolating_spline
 from ..progress import checkpoint
+from ..relaxation.close_points import GREATEST_TURN, turns
 from ..repair.surface_normals import surface_normals
 
 SMOOTHING = 0.35
@@ -62,9 +64,9 @@ DENSE = 0.1
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED = 8, 4
+MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 4, 2
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
-are designed without a start in each part of the third one."""
+are designed without a start in each part of the third one; fewer in its last part."""
 
 MOST_POINTS = 48
 """Greatest number of control points that are tried, unless the first guess has more than half of
@@ -115,10 +117,11 @@ def checked_stroke(
     if not np.isfinite(stroke).all():
         raise ArgumentError("points has NaN or infinite coordinates; pass finite positions")
     same = COINCIDENT * mesh.diagonal
-    kept = np.append(True, np.linalg.norm(np.diff(stroke, axis=0), axis=1) > same)
-    stroke = stroke[kept]
-    if closed and len(stroke) > 1 and np.linalg.norm(stroke[0] - stroke[-1]) <= same:
-        stroke = stroke[:-1]
+    with np.errstate(over="ignore"):  # the square of a distance may be infinite
+        kept = np.append(True, np.linalg.norm(np.diff(stroke, axis=0), axis=1) > same)
+        stroke = stroke[kept]
+        if closed and len(stroke) > 1 and np.linalg.norm(stroke[0] - stroke[-1]) <= same:
+            stroke = stroke[:-1]
     fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
     if len(stroke) < fewest:
         raise ArgumentError(
@@ -160,9 +163,9 @@ def fitted_points(
         )
     samples = _sampled(stroke, tolerance, closed)
     for places in _smoothed_lines(stroke, tolerance, closed):
-        fit = _Fit(mesh, places, samples, tolerance, closed, design)
         on_surface = nearest_points(mesh, places)[0]
         normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
+        fit = _Fit(mesh, places, normals, samples, tolerance, closed, design)
         guess = _fewest_knots(places, normals, tolerance, closed)
         most = max(MOST_POINTS, 2 * len(guess))
         found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
@@ -170,6 +173,8 @@ def fitted_points(
             found = fit.refined(found, most, MOST_DESIGNED, along=False)
         if found is None:
             found = fit.refined(guess, most, MOST_DESIGNED, along=False)
+        if found is None:
+            found = fit.refined(fit.close(guess), most, MOST_CLOSE, along=False)
         if found is not None:
             return fit.points(found)
     raise UnreachableError(
@@ -184,6 +189,7 @@ class _Fit:
 
     mesh: Mesh
     places: FloatArray
+    normals: FloatArray
     stroke: FloatArray
     tolerance: float
     closed: bool
@@ -227,6 +233,24 @@ class _Fit:
                 return None
             knots = finer
         return None
+
+    def close(self, knots: IntArray) -> IntArray:
+        """Knots, with others added beside those where lines between them turn much.
+
+        The course of the curve through them is then that of the stroke; see `close_points`.
+        """
+        m = len(self.places)
+        while True:
+            turning = turns(self.places[knots], self.normals[knots], self.closed) > GREATEST_TURN
+            before, after = np.roll(knots, 1), np.roll(knots, -1)
+            before[0] -= m
+            after[-1] += m
+            gaps = np.stack([[before, knots], [knots, after]], axis=1)[:, :, turning]
+            gaps = gaps.reshape(2, -1)
+            gaps = gaps[:, gaps[1] - gaps[0] >= 2 * APART]
+            if not gaps.size:
+                return knots
+            knots = np.union1d(knots, gaps.sum(axis=0) // 2 % m)
 
     def missing(self, knots: IntArray, curve: SurfaceCurve) -> IntArray:
         """The places between knots where a curve is too far from the stroke, the worst first.

@@ -120,6 +120,7 @@ def test_points_on_the_surface_are_returned(body):
         ({"points": np.zeros((5, 3))}, nicmm.ArgumentError, "1 different points"),
         ({"points": "line"}, nicmm.ArgumentError, "cannot be read as numbers"),
         ({"points": [[3.0, 0.0, 0.0], [0.0, 3.0, 0.0]]}, nicmm.ControlPointError, "off the surf"),
+        ({"points": 1e200 * np.eye(3)}, nicmm.ControlPointError, "inf off the surface"),
         ({"closed": 2}, nicmm.ArgumentError, "closed is 2"),
     ],
 )
