@@ -150,6 +150,32 @@ def section(results: Results) -> str:
     )
 
 
+def summary(results: Results) -> str:
+    """What the documents say of it."""
+    fits = results["fits"]
+    done = [each for each in fits if "error" not in each]
+    within = [each for each in done if each["away"] <= 1.0]
+    small = [each["seconds"] for each in done if each["faces"] <= FACES]
+    slow = sum(each > SECONDS for each in small)
+    points, seconds = (
+        report.listed(
+            f"{np.median([each[name] for each in done if each['closed'] is closed]):.{digits}f} "
+            f"for {kind} ones"
+            for kind, closed in (("open", False), ("closed", True))
+        )
+        for name, digits in (("points", 0), ("seconds", 1))
+    )
+    return report.paragraph(
+        f"`python -m benchmarks strokes` fits {SAMPLES} samples of random designed curves, each "
+        f"moved by up to {100 * NOISE:g} % of the curve's length or of the mesh's diagonal, with a "
+        f"tolerance of twice that: {len(within)} of {len(fits)} strokes are fitted. The median "
+        f"number of points is {points}, and the median time in seconds {seconds}. Below "
+        f"{FACES:,} faces {slow} of {len(small)} strokes take more than {SECONDS:g} s, at most "
+        f"{max(small):.0f} s. Most of the time is that of designing the curve, so strokes that "
+        "wind around limbs, or lie on rough surfaces, take longest."
+    )
+
+
 def _row(fits: list[dict[str, Any]]) -> tuple[str | int, ...]:
     """The columns of a row after its name."""
     done = [each for each in fits if "error" not in each]

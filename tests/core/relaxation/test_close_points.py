@@ -48,7 +48,8 @@ def test_legs_of_a_circle_are_short_unless_one_is_most_of_it(flat_disc):
 
 
 def test_waves_between_two_points_bend_more_than_these(flat_disc):
-    waves = np.array([[0.25 * i - 0.5, 0.15 * (-1) ** i, 0.0] for i in range(5)])
+    angles = np.linspace(0.0, 2.0 * np.pi, 9)
+    waves = np.stack([0.15 * (angles - np.pi), 0.2 * np.sin(angles), 0.0 * angles], axis=1)
     curve = relaxed(flat_disc, waves, closed=False)
     assert bends_like_points(curve)
     assert not bends_like_points(replace(curve, control_nodes=curve.control_nodes[[0, -1]]))
