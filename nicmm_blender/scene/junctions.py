@@ -127,16 +127,22 @@ def followed(
 
 
 def snapped(mesh: Mesh, points: SurfacePoints, others: Sequence[OtherCurve]) -> SurfacePoints:
-    """Control points, of which those within `SNAP` of another curve are put exactly onto it."""
-    from ...nicmm_core.geometry.curve_places import nearest_point
+    """Control points, of which those within `SNAP` of another curve are put exactly onto it.
 
-    placed = set()
+    Where curves cross, a control point of one of them lies on the others, so control points come
+    first.
+    """
+    from ...nicmm_core.geometry.curve_places import nearest_control_point, nearest_point
+
+    curves: dict[int, list[SurfaceCurve]] = {}
     for number, _other, _part, curve in _on_other_curves(mesh, points, others):
-        if number in placed:
-            continue
-        placed.add(number)
+        curves.setdefault(number, []).append(curve)
+    for number, near in curves.items():
         position = points[np.array([number])].positions(mesh)[0]
-        place, away = nearest_point(mesh, curve, position)
+        found = (nearest_control_point(curve, position) for curve in near)
+        place, away = min(found, key=lambda each: each[1])
+        if away > SNAP * mesh.diagonal:
+            place, away = nearest_point(mesh, near[0], position)
         if away > SAME_PLACE * mesh.diagonal:
             points = point_lists.with_point(points, number, place, replaced=True)
     return points

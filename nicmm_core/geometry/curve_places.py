@@ -76,6 +76,17 @@ def distances(curve: SurfaceCurve, positions: FloatArray) -> FloatArray:
     return np.array([nearest_segment(curve, position)[2] for position in positions])
 
 
+def nearest_control_point(curve: SurfaceCurve, position: FloatArray) -> tuple[SurfacePoints, float]:
+    """The control point of a curve nearest to a position, (3,), and its distance.
+
+    The distance is infinite if the curve passes no control point.
+    """
+    passed = curve.control_index[curve.control_index >= 0]
+    away = np.linalg.norm(curve.points[passed] - position, axis=1)
+    nearest = passed[away.argsort()[:1]]
+    return points_of(curve)[nearest], float(away.min(initial=np.inf))
+
+
 def nearest_point(
     mesh: Mesh, curve: SurfaceCurve, position: FloatArray
 ) -> tuple[SurfacePoints, float]:

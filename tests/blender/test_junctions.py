@@ -99,9 +99,12 @@ def tee(empty_scene, first, request):
 
 @pytest.fixture
 def cross(empty_scene, first):
-    """An open curve that passes through a point of the first one to the other side."""
+    """An open curve that passes through a point of the first one to the other side.
+
+    The point is not right beside a vertex, where a third curve from there cannot always follow.
+    """
     ends = on(first, ring([110.0, 150.0], [0.5, -0.5]))
-    places = [ends[0], place_on(empty_scene, "First"), ends[1]]
+    places = [ends[0], place_on(empty_scene, "First", share=0.3), ends[1]]
     draw(first, places, "Second", closed=False, avoid_others=True, clearance=CLEARANCE)
     return first
 

@@ -1,5 +1,7 @@
 """Places on curves: they stay on the curve, and are found again by leg and fraction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from nicmm_core import shapes
 from nicmm_core.geometry.curve import points_of_leg
 from nicmm_core.geometry.curve_places import (
     CurvePlace,
+    nearest_control_point,
     nearest_place,
     nearest_point,
     number_of_legs,
@@ -80,3 +83,16 @@ def test_points_beside_an_edge_stay_on_the_curve_when_located(mesh, curve):
             design_point = nicmm.SurfacePoints(point.faces, point.barycentric)
             located = nicmm.geometry.surface_points.locate_points(mesh, design_point, "points")
             assert away_from(curve, located.positions(mesh)[0]) < 1e-9 * mesh.diagonal
+
+
+def test_the_nearest_control_point_is_found(mesh, curve):
+    for control in curve.control_index:
+        position = curve.points[control]
+        point, away = nearest_control_point(curve, position + 1e-7)
+        np.testing.assert_allclose(point.positions(mesh)[0], position, atol=1e-15)
+        assert away == pytest.approx(np.sqrt(3.0) * 1e-7)
+
+
+def test_a_curve_without_control_points_has_no_nearest_one(curve):
+    point, away = nearest_control_point(replace(curve, control_index=np.array([-1])), np.zeros(3))
+    assert len(point) == 0 and away == np.inf
