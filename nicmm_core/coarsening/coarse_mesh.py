@@ -152,10 +152,10 @@ def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> Coa
     areas = np.bincount(faces.ravel(), shares, len(mesh.vertices)).astype(np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
-    seed = spread_vertices(mesh, vertex_normals, areas, CANDIDATES * count, distance)
-    # Lengths are changed slightly, so that no two paths on a grid are equally long. Hashes of
-    # positions replace random numbers, so the result does not depend on the numbering.
+    # Hashes of positions replace random numbers, so the result does not depend on the numbering.
     chance = uniform_hash(frame_coordinates(mesh.vertices, faces, mesh.face_areas))
+    seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
+    # Lengths are changed slightly, so that no two paths on a grid are equally long.
     lengths = edge_lengths(mesh.vertices, mesh.edges)
     lengths *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
     size = len(mesh.vertices)

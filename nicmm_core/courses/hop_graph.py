@@ -129,9 +129,13 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
     vertex = np.flatnonzero(areas > 0.0)
     spacing = float(np.sqrt(areas.sum() / min(SEARCH_CELLS, len(vertex))))
     if len(vertex) > SEARCH_CELLS:
-        candidates, distance = CANDIDATES * SEARCH_CELLS, PACKING * spacing
+        # The numbering depends only on the surface (`geometry.numbering`), so the sample does too.
+        chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
         normals = surface.vertex_normals
-        vertex = spread_vertices(mesh, normals, areas, candidates, distance, NORMAL_WEIGHT)
+        distance = PACKING * spacing
+        vertex = spread_vertices(
+            mesh, normals, areas, chance, CANDIDATES * SEARCH_CELLS, distance, NORMAL_WEIGHT
+        )
     checkpoint()
     start, end, along = nicmm_kernels.nearest_cells(
         mesh.edge_graph, vertex, HOPS, REACH * spacing, checkpoint

@@ -238,10 +238,8 @@ def _rounded_soundly(
     return places, integers
 
 
-def frame_coordinates(
-    vertices: FloatArray, faces: IntArray, face_areas: FloatArray, unit: float | None = None
-) -> IntArray:
-    """Coordinates in the principal frame of some faces, rounded to a unit, as integers, (V, 3).
+def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> IntArray:
+    """Rounded coordinates in the principal frame of some faces, as integers, (V, 3).
 
     Parameters
     ----------
@@ -249,13 +247,10 @@ def frame_coordinates(
     faces : (F, 3) int array
         The faces that determine the frame.
     face_areas : (F,) float array
-    unit : float, optional
-        In mesh units; by default the first of `RESOLUTIONS`.
     """
     frame = principal_frame(vertices, faces, face_areas)
     with np.errstate(over="ignore"):  # vertices without faces may be anywhere
-        resolution = RESOLUTIONS[0] if unit is None else unit / frame.unit
-        return _integers(frame.coordinates(vertices) / resolution)
+        return _integers(frame.coordinates(vertices) / RESOLUTIONS[0])
 
 
 def _integers(coordinates: FloatArray) -> IntArray:

@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from .array_types import FloatArray, IntArray
 from .mesh import Mesh
-from .numbering import frame_coordinates, uniform_hash
 
 CANDIDATES = 8
 """Number of candidate vertices per seed."""
@@ -26,25 +25,16 @@ a plate or of a thin limb get separate seeds.
 """
 
 
-BLOCK = 0.25
-"""Side of the blocks of space whose vertices have the same random number, in least distances.
-
-They are so large that small changes of the surface hardly move a vertex to another block.
-"""
-
-
 def spread_vertices(
     mesh: Mesh,
     normals: FloatArray,
     areas: FloatArray,
+    chance: FloatArray,
     n_candidates: int,
     distance: float,
     normal_weight: float = NORMAL_WEIGHT,
 ) -> IntArray:
     """Choose vertices that are at least a distance apart.
-
-    They depend on positions and areas only, not on the numbering. Where the surface or its
-    triangulation changes a little, most of them stay the same.
 
     Parameters
     ----------
@@ -53,6 +43,8 @@ def spread_vertices(
         Unit normals at the vertices.
     areas : (V,) float array
         Area of the surface around each vertex. Vertices without area are never chosen.
+    chance : (V,) float array
+        Random numbers in (0, 1), which determine the candidates.
     n_candidates : int
         Number of candidates, which are sampled with probabilities in proportion to their areas.
     distance : float
@@ -66,8 +58,6 @@ def spread_vertices(
         The chosen vertices, ascending.
     """
     there = np.flatnonzero(areas > 0.0)
-    blocks = frame_coordinates(mesh.vertices, mesh.faces, mesh.face_areas, BLOCK * distance)
-    chance = uniform_hash(blocks)
     # The vertices with the smallest exponentially distributed times are a sample without
     # replacement, weighted by area.
     times = -np.log(chance[there]) / areas[there]
