@@ -167,7 +167,7 @@ class Improvement:
         request = self.request
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
-            self._search(courses, further, start_kind)
+            self._search_further(courses, further, start_kind)
         if self._should_tighten():
             self.attempt(self.starts[self.best], self._limited(TIGHTENED))
         if start_kind is not StartKind.PATH and self._should_try_path():
@@ -184,7 +184,7 @@ class Improvement:
             for start in itertools.islice(new, MAX_COURSES_RELAXED + 2 * request.alternatives):
                 self.attempt(start, relaxation_config(request))
 
-    def _search(
+    def _search_further(
         self,
         courses: Iterator[InitialCurve],
         further: list[Iterator[InitialCurve]],

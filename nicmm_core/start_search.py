@@ -1,7 +1,7 @@
 """Searches for starts: simple curves on a mesh from which relaxation begins.
 
-A start is a course of a search (`courses`), the spline through many control points (`spline`), or
-the initial path (`path`). On a large mesh courses are searched for on a coarse mesh (`coarsening`).
+A start is a course of a search (`courses`), the spline through many control points, or the initial
+path (both in `path`). On a large mesh courses are searched for on a coarse mesh (`coarsening`).
 """
 
 from __future__ import annotations

@@ -84,9 +84,8 @@ class CoarseMesh:
             If a cell has no coarse face.
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
-
         cells, group = np.unique(self.cell[corner], return_inverse=True)
-        at_cells = self.mesh.vertex_faces.astype(np.int32)
+        at_cells = self.mesh.vertex_faces.astype(np.int32)  # sums of bytes might overflow to zero
         around = at_cells[cells] @ at_cells.T @ at_cells
         return _nearest_in_groups(self.mesh, points.positions(fine), group, around)
 

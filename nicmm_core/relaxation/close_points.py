@@ -53,8 +53,7 @@ def has_short_legs(curve: DiscreteCurve) -> bool:
     controls, legs = curve.control_nodes, slice(None if curve.closed else -1)
     points = curve.nodes.positions[controls]
     apart = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-    leg_lengths = np.add.reduceat(curve.nodes.step_lengths, controls)
-    return bool((leg_lengths[legs] <= LONGEST_LEG * apart[legs]).all())
+    return bool((_leg_lengths(curve)[legs] <= LONGEST_LEG * apart[legs]).all())
 
 
 def bends_like_points(curve: DiscreteCurve) -> bool:
@@ -62,7 +61,12 @@ def bends_like_points(curve: DiscreteCurve) -> bool:
     nodes, controls = curve.nodes, curve.control_nodes
     angles = turns(nodes.positions[controls], nodes.normals[controls], curve.closed)
     angles[np.isin(controls, curve.corner_nodes)] = 0.0
-    leg_lengths = np.add.reduceat(nodes.step_lengths, controls)
+    leg_lengths = _leg_lengths(curve)
     of_points = 0.5 * (leg_lengths + np.roll(leg_lengths, 1))
     bending = curve.length * float((angles**2 / of_points).sum())
     return scaled_bending(curve) <= MORE_BENDING * bending + FURTHER_BENDING
+
+
+def _leg_lengths(curve: DiscreteCurve) -> FloatArray:
+    """Length of the leg after each control point, (k,); zero after the end of an open curve."""
+    return np.add.reduceat(curve.nodes.step_lengths, curve.control_nodes)
