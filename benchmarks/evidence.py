@@ -11,9 +11,11 @@ import ast
 import datetime
 import hashlib
 import importlib
+import importlib.util
 import json
 import os
 import platform
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -121,6 +123,14 @@ def machine() -> str:
         f"Python {platform.python_version()}, NumPy {numpy.__version__}, "
         f"SciPy {scipy.__version__}, PyTorch {version('torch').split('+')[0]}"
     )
+
+
+def are_installed(packages: Iterable[str], scale: Scale) -> bool:
+    """Whether packages are installed; if not, a full run ends with a message."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing and scale is Scale.FULL:
+        raise SystemExit(f"Packages are missing. Run: .venv/bin/pip install {' '.join(missing)}")
+    return not missing
 
 
 def code_behind(name: str) -> str:

@@ -13,7 +13,7 @@ from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, renders, report
-from .evidence import EVERY_METHOD, Results
+from .evidence import EVERY_METHOD, Results, are_installed
 from .measures import bending
 from .methods import METHODS
 from .peer_sizes import measured_sizes, sizes_section
@@ -51,6 +51,7 @@ ONE_CURVE = "one curve"
 def measure(scale: Scale) -> Results:
     """Compute a curve through the same points in the same order with every system."""
     missing = missing_packages()
+    are_installed(missing, scale)
     systems = [name for name, (package, _) in SYSTEMS.items() if package not in missing]
     sets: list[Results] = []
     pictures: list[renders.Picture] = []
