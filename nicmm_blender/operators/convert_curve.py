@@ -68,8 +68,9 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         surface = curve_record.surface_of(original, mesh_object)
         curves = curve_record.read_curves(original, surface)
         if self.output == writing.PARALLEL:
-            _, count = parallel_curves.add(context, original, surface, curves, self)
-            self.report({"INFO"}, f'"{name}": {counted(count, "parallel curve")}')
+            found = parallel_curves.computed(surface, curves, self)
+            parallel_curves.add(context, original, surface, found, self)
+            self.report({"INFO"}, f'"{name}": {counted(len(found), "parallel curve")}')
             return {"FINISHED"}
         curve_settings = curve_record.settings_of(original)
         is_separate = self.output in writing.SEPARATE
@@ -95,8 +96,8 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
             converted = context.active_object
             if not self.keep_original:
                 curve_record.take_place_of(converted, original)
-            for material in original.data.materials:
-                converted.data.materials.append(material)
+                parallel_curves.set_source(converted, original)
+            curve_object.copy_materials(original, converted)
         if not self.keep_original:
             curve_object.remove(original)
             if is_separate:

@@ -41,6 +41,10 @@ WAIT = 0.1
 """Seconds until the next check whether work may begin or continue."""
 
 
+Surfaces = dict[tuple[bpy.types.Object, bool, bool], Surface]
+"""Surfaces by the mesh object, the use of modifiers, and whether the cage is traced."""
+
+
 @dataclass(frozen=True)
 class _Failure:
     """Why a curve could not be updated.
@@ -106,14 +110,13 @@ def tick(seconds: float = TIME_SLICE) -> float | None:
         if remaining > 0.0 or _has_to_wait():
             return max(remaining, WAIT)
         _begin()
-    if _updates.work is None:
-        return None
-    if _has_to_wait():
-        return WAIT
-    if _updates.work.run_slice(seconds):
+    if _updates.work is not None:
+        if _has_to_wait():
+            return WAIT
+        if not _updates.work.run_slice(seconds):
+            return PAUSE
         _write(_updates.work)
-        return PAUSE if _updates.changed else None
-    return PAUSE
+    return PAUSE if _updates.changed or _updates.everything else None
 
 
 def messages(mesh_object: bpy.types.Object) -> list[str]:
@@ -132,7 +135,7 @@ def _begin() -> None:
     """Start work on the outdated curves."""
     changed, everything = _updates.changed, _updates.everything
     _updates.changed, _updates.everything = set(), False
-    surfaces: dict[tuple[bpy.types.Object, bool], Surface] = {}
+    surfaces: Surfaces = {}
     with _unnoticed():
         for designed in _live_curves():
             mesh_object = curve_record.mesh_of(designed)
@@ -158,7 +161,7 @@ def _unnoticed() -> Iterator[None]:
 def _add_request(
     designed: bpy.types.Object,
     mesh_object: bpy.types.Object,
-    surfaces: dict[tuple[bpy.types.Object, bool], Surface],
+    surfaces: Surfaces,
 ) -> None:
     """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
     from ... import nicmm_core as nicmm
@@ -169,10 +172,7 @@ def _add_request(
         settings = curve_record.settings_of(designed)
         if not curve_record.has_curve(designed):  # a drawing with too few points
             return
-        key = mesh_object, settings.use_modifiers
-        if key not in surfaces:
-            surfaces[key] = read(mesh_object, settings.use_modifiers, traced=False)
-        surface = surfaces[key]
+        surface = _read_once(mesh_object, settings.use_modifiers, False, surfaces)
         others = avoided_curves.above(designed, mesh_object, surface, settings)
         now = curve_record.digest(mesh_object, surface, settings, others)
         updated = {uid for uid, _ in _updates.curves}
@@ -183,13 +183,23 @@ def _add_request(
         if uid in _updates.failed and _updates.failed[uid].digest == now and not follows:
             return
         writing.check_replaceable(designed)
-        traced = read(mesh_object, settings.use_modifiers)
+        traced = _read_once(mesh_object, settings.use_modifiers, True, surfaces)
         request = design_request.for_curve(designed, mesh_object, traced, settings)
     except (InputError, nicmm.NicmmError) as error:
         _note_failure(designed, now, error)
         return
     _updates.requests.append(request)
     _updates.curves.append((uid, curve_record.digest_of(designed)))
+
+
+def _read_once(
+    mesh_object: bpy.types.Object, use_modifiers: bool, traced: bool, surfaces: Surfaces
+) -> Surface:
+    """A surface; with its cage traced, which takes longer, if `traced` is set."""
+    key = mesh_object, use_modifiers, traced
+    if key not in surfaces:
+        surfaces[key] = read(mesh_object, use_modifiers, traced)
+    return surfaces[key]
 
 
 def _write(work: time_slices.Work[list[Answer]]) -> None:

@@ -96,8 +96,11 @@ class NICMM_OT_new_map(bpy.types.Operator):
         mode = mesh_object.mode
         _enter(context, mesh_object, "OBJECT")
         group = mesh_object.vertex_groups.new(name=NAMES[self.role])
-        for vertex in np.flatnonzero(weights).tolist():
-            group.add([vertex], float(weights[vertex]), "REPLACE")
+        ascending = np.argsort(weights, kind="stable")
+        values, begins = np.unique(weights[ascending], return_index=True)
+        for weight, vertices in zip(values.tolist(), np.split(ascending, begins[1:]), strict=True):
+            if weight:
+                group.add(vertices.tolist(), weight, "REPLACE")
         # The mesh is active now, but the map is for the curve that was.
         setattr(_settings(context, curve), FIELDS[self.role], group.name)
         mesh_object.vertex_groups.active_index = group.index

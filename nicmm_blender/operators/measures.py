@@ -75,20 +75,23 @@ def now(curve: bpy.types.Object) -> Measured:
     if found is None or found[0] != surface_cache.changes():
         try:
             measured = _measure(curve)
-        except (InputError, nicmm.NicmmError) as error:
+        except (InputError, nicmm.NicmmError, ImportError) as error:
             measured = Measured([], [], [], str(error))
         found = _measured[curve.session_uid] = surface_cache.changes(), measured
     return found[1]
 
 
-def _compute_wanted() -> None:
-    """Compute what panels have asked for."""
+def _compute_wanted() -> float | None:
+    """Compute what panels have asked for, but not during a render: reading makes objects."""
+    if bpy.app.is_job_running("RENDER"):
+        return DELAY
     wanted = [by_uid(uid) for uid in _wanted]
     _wanted.clear()
     for curve in wanted:
         if curve_record.has_record(curve):
             now(curve)
     redraw_sidebars()
+    return None
 
 
 def _measure(curve: bpy.types.Object) -> Measured:

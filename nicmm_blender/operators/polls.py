@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene import messages
+
 OBJECT = ({"OBJECT"}, "Switch to Object Mode")
 OBJECT_OR_EDIT = ({"OBJECT", "EDIT_MESH"}, "Switch to Object Mode or Edit Mode")
 OBJECT_EDIT_OR_WEIGHTS = (
@@ -23,7 +25,7 @@ TOOL_OR_EDIT = (
 
 NO_MESH = "Make a mesh object active"
 NO_CURVE = "Make a designed curve active"
-NO_MESH_OR_CURVE = "Make a mesh or a designed curve active"
+NO_MESH_OR_CURVE = messages.NO_MESH_OR_CURVE
 """Messages for an active object of the wrong type."""
 
 

@@ -11,8 +11,10 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
+from mathutils import Matrix
+
 from ..outputs import curve_object, edited_curve
-from ..scene import curve_record, mesh_data
+from ..scene import curve_record, mesh_arrays, mesh_data
 from ..scene.messages import InputError, counted, user_message
 from . import polls
 from .answers import answer_now
@@ -21,13 +23,17 @@ from .error_reports import with_error_reports
 if TYPE_CHECKING:
     from ..outputs.edited_curve import Opened
 
-SOURCES = {"CURVE", "CURVES", "GREASEPENCIL", "GPENCIL"}
+SOURCES = {"CURVE", "CURVES", "GREASEPENCIL"}
 """Types of objects that have strokes."""
 
 NO_STROKES = "Select Grease Pencil or curve objects, and make the mesh active"
 
 FEWEST = 2
 """Least number of points of a stroke."""
+
+
+Line = tuple[np.ndarray, bool, Matrix]
+"""Points of a line, (n, 3), whether it is closed, and the transform of its points to the world."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +69,9 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        mesh_object = mesh_data.mesh_object(context)
-        can_run = mesh_object is not None and bool(_sources(context))
+        # The new curve is active and selected afterwards. The redo panel exists only if the
+        # operator could run then, although Blender undoes it first.
+        can_run = has_strokes(context) or curve_record.has_record(context.active_object)
         return polls.usable(cls, context, can_run, NO_STROKES, polls.OBJECT)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -73,11 +80,13 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
     def _execute(self, context: bpy.types.Context) -> set[str]:
         from ... import nicmm_core as nicmm
 
-        mesh_object = mesh_data.mesh_object(context)
-        sources = _sources(context)
-        strokes = [stroke for source in sources for stroke in strokes_of(context, source)]
-        if mesh_object is None or not strokes:
+        mesh_object, sources = mesh_data.mesh_object(context), _sources(context)
+        if mesh_object is None or not sources:
+            raise InputError(NO_STROKES)
+        strokes = [stroke for source in sources for stroke in strokes_of(source)]
+        if not strokes:
             raise InputError("The selected objects have no strokes with at least two points")
+        selected = context.selected_objects
         made, remarks = [], []
         for stroke in strokes:
             try:
@@ -87,6 +96,8 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
             except nicmm.NicmmError as error:
                 remarks.append(f'"{stroke.name}": {user_message(error)}')
         if not made:
+            for each in selected:
+                each.select_set(True)
             raise InputError("; ".join(remarks))
         if not self.keep_original and not remarks:
             for source in sources:
@@ -109,6 +120,11 @@ class NICMM_OT_strokes_to_curves(bpy.types.Operator):
         return made
 
 
+def has_strokes(context: bpy.types.Context) -> bool:
+    """Whether objects with strokes are selected and a mesh is active."""
+    return mesh_data.mesh_object(context) is not None and bool(_sources(context))
+
+
 def _sources(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected objects with strokes, without designed curves."""
     return [
@@ -128,48 +144,58 @@ def _through(opened: Opened, stroke: Stroke, tolerance: float) -> Opened:
     return edited_curve.new_through(opened, found, stroke.closed)
 
 
-def strokes_of(context: bpy.types.Context, source: bpy.types.Object) -> Iterator[Stroke]:
-    """The strokes of an object as it is shown."""
-    found = _pencil_strokes(source) if "PENCIL" in source.type else _curve_lines(context, source)
-    world = np.array(source.matrix_world)
-    for points, closed in found:
+def strokes_of(source: bpy.types.Object) -> Iterator[Stroke]:
+    """The strokes of an object, without its modifiers."""
+    found = _pencil_strokes if source.type == "GREASEPENCIL" else _curve_lines
+    for points, closed, to_world in found(source):
         if len(points) >= FEWEST:
-            yield Stroke(source.name, points @ world[:3, :3].T + world[:3, 3], closed)
+            matrix = np.array(to_world)
+            yield Stroke(source.name, points @ matrix[:3, :3].T + matrix[:3, 3], closed)
 
 
-def _pencil_strokes(source: bpy.types.Object) -> Iterator[tuple[np.ndarray, bool]]:
-    """Points of the strokes of a Grease Pencil object at the current frame, in its local space."""
+def _pencil_strokes(source: bpy.types.Object) -> Iterator[Line]:
+    """The strokes of a Grease Pencil object at the current frame."""
     for layer in source.data.layers:
-        if layer.hide:
-            continue
-        if source.type == "GPENCIL":  # before Blender 4.3
-            strokes = layer.active_frame.strokes if layer.active_frame else ()
-            for stroke in strokes:
-                yield np.array([point.co[:] for point in stroke.points]), stroke.use_cyclic
-            continue
         frame = layer.current_frame()
-        for stroke in frame.drawing.strokes if frame is not None else ():
-            yield np.array([point.position[:] for point in stroke.points]), stroke.cyclic
+        if layer.hide or frame is None:
+            continue
+        to_world = _parent_to_world(source, layer) @ layer.matrix_local
+        for stroke in frame.drawing.strokes:
+            points = np.array([point.position[:] for point in stroke.points])
+            yield points, stroke.cyclic, to_world
 
 
-def _curve_lines(
-    context: bpy.types.Context, source: bpy.types.Object
-) -> Iterator[tuple[np.ndarray, bool]]:
-    """Points of the splines of a curve object, without its bevel, in its local space."""
+def _parent_to_world(source: bpy.types.Object, layer: bpy.types.GreasePencilLayer) -> Matrix:
+    """The transform to the world from the space in which a layer is placed."""
+    parent = layer.parent
+    if parent is None:
+        return source.matrix_world
+    to_world = parent.matrix_world
+    if parent.type == "ARMATURE" and layer.parent_bone in parent.pose.bones:
+        to_world = to_world @ parent.pose.bones[layer.parent_bone].matrix
+    return to_world @ layer.matrix_parent_inverse
+
+
+def _curve_lines(source: bpy.types.Object) -> Iterator[Line]:
+    """The splines of a curve object, without its bevel."""
+    world = source.matrix_world
     if source.type == "CURVES":
-        positions = np.empty((len(source.data.points), 3), dtype=np.float32)
-        source.data.points.foreach_get("position", positions.ravel())
-        for curve in source.data.curves:
+        positions = mesh_arrays.read(source.data.points, "position", 3, np.float32)
+        cyclic = source.data.attributes.get("cyclic")
+        for number, curve in enumerate(source.data.curves):
             begin = curve.first_point_index
-            yield positions[begin : begin + curve.points_length].astype(np.float64), False
+            points = positions[begin : begin + curve.points_length].astype(np.float64)
+            yield points, cyclic is not None and cyclic.data[number].value, world
         return
     plain = source.data.copy()
     try:
+        plain.dimensions = "3D"  # a flat curve would be filled
         plain.bevel_depth = plain.extrude = plain.offset = 0.0
         plain.bevel_object = plain.taper_object = None
         holder = bpy.data.objects.new(source.name, plain)
         mesh = holder.to_mesh()
-        yield from _lines_of_mesh(mesh)
+        for points, closed in _lines_of_mesh(mesh):
+            yield points, closed, world
         holder.to_mesh_clear()
         bpy.data.objects.remove(holder)
     finally:
@@ -184,7 +210,7 @@ def _lines_of_mesh(mesh: bpy.types.Mesh) -> Iterator[tuple[np.ndarray, bool]]:
     for end in range(1, len(places) + 1):
         if end < len(places) and (end - 1, end) in pairs:
             continue
-        yield places[begin:end], (begin, end - 1) in pairs and end - begin > FEWEST
+        yield places[begin:end], (begin, end - 1) in pairs and end - begin > 2
         begin = end
 
 

@@ -11,12 +11,16 @@ from ..scene import curve_record, design_request, mesh_data
 from ..scene.curve_record import CurveSettings
 from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
-from ..scene.surface import read
+from ..scene.surface import Surface, read
 from . import polls
 from .long_solves import LongSolves
 
 if TYPE_CHECKING:
     from ..scene.design_request import Answer
+
+
+Surfaces = dict[tuple[bpy.types.Object, bool], Surface]
+"""Surfaces by the mesh object and the use of modifiers."""
 
 
 class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
@@ -50,10 +54,11 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         if self.use_panel:
             chosen = curve_record.settings_from(context.scene.nicmm_curves)
         requests, self._names, self._failed = [], [], []
+        surfaces: Surfaces = {}
         for designed in self._curves(context):
             try:
                 writing.check_replaceable(designed)
-                requests.append(request_again(designed, chosen))
+                requests.append(_request_again(designed, chosen, surfaces))
                 self._names.append(designed.name)
             except InputError as error:
                 self._failed.append((designed.name, str(error)))
@@ -113,13 +118,20 @@ def named(name: str) -> bpy.types.Object:
     return found
 
 
-def request_again(designed: bpy.types.Object, chosen: CurveSettings | None = None) -> DesignRequest:
-    """A request to design a curve again, with its recorded settings or with `chosen`."""
+def _request_again(
+    designed: bpy.types.Object, chosen: CurveSettings | None, surfaces: Surfaces
+) -> DesignRequest:
+    """A request to design a curve again, with its recorded settings or with `chosen`.
+
+    `surfaces` has those read so far.
+    """
     mesh_object = curve_record.mesh_in_any_scene(designed)
-    mesh_data.synchronise(mesh_object)
     settings = curve_record.settings_of(designed) if chosen is None else chosen
-    surface = read(mesh_object, settings.use_modifiers)
-    return design_request.for_curve(designed, mesh_object, surface, settings)
+    key = mesh_object, settings.use_modifiers
+    if key not in surfaces:
+        mesh_data.synchronise(mesh_object)
+        surfaces[key] = read(mesh_object, settings.use_modifiers)
+    return design_request.for_curve(designed, mesh_object, surfaces[key], settings)
 
 
 def register() -> None:

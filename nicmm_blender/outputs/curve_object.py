@@ -13,7 +13,8 @@ import numpy as np
 
 from mathutils import Matrix
 
-from ..scene import curve_record
+from ..scene import curve_record, mesh_arrays
+from ..scene.messages import InputError
 from ..scene.surface import Surface
 from .clean_curves import Knots, Polyline, Spline
 
@@ -86,15 +87,24 @@ def _mean_scale(matrix: Matrix) -> float:
 
 def to_object_space(curve_object: bpy.types.Object, points: np.ndarray) -> np.ndarray:
     """Transform points (n, 3) from the mesh's local space to the space of a curve object."""
+    to_curve = _to_object_space(curve_object)
+    if to_curve == Matrix():
+        return points
+    matrix = np.array(to_curve)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def is_reflected(curve_object: bpy.types.Object) -> bool:
+    """Whether the transform from the mesh's local space to that of a curve object reflects."""
+    return _to_object_space(curve_object).is_negative
+
+
+def _to_object_space(curve_object: bpy.types.Object) -> Matrix:
+    """The matrix from the mesh's local space to the space of a curve object."""
     if is_child(curve_object):
-        to_mesh = _to_mesh_space(curve_object)
-        if to_mesh == Matrix():
-            return points
-        to_curve = np.array(to_mesh.inverted_safe())
-    else:
-        in_world = np.array(curve_record.mesh_in_any_scene(_designed(curve_object)).matrix_world)
-        to_curve = np.array(curve_object.matrix_world.inverted_safe()) @ in_world
-    return points @ to_curve[:3, :3].T + to_curve[:3, 3]
+        return _to_mesh_space(curve_object).inverted_safe()
+    mesh_object = curve_record.mesh_in_any_scene(_designed(curve_object))
+    return curve_object.matrix_world.inverted_safe() @ mesh_object.matrix_world
 
 
 def _mesh_of(curve_object: bpy.types.Object) -> bpy.types.Object | None:
@@ -112,8 +122,55 @@ def _designed(curve_object: bpy.types.Object) -> bpy.types.Object:
     return curve_object.nicmm_parallel.source or curve_object
 
 
+def check_replaceable(curve_object: bpy.types.Object, count: int) -> None:
+    """Raise an error if the points of a curve object cannot be replaced.
+
+    `count` is the number of its curves; it must not contain further ones.
+    """
+    library = curve_object.library or curve_object.data.library
+    if library is not None:
+        raise InputError(
+            f'"{curve_object.name}" is linked from {library.filepath}. '
+            "Make it local (Object > Relations > Make Local)"
+        )
+    if curve_object.override_library or curve_object.data.override_library:
+        raise InputError(
+            f'"{curve_object.name}" is a library override, and Blender would not save its new '
+            "points. Make it local (Object > Relations > Make Local)"
+        )
+    if curve_object.mode != "OBJECT":
+        raise InputError(f'"{curve_object.name}" is being edited. Switch to Object Mode first')
+    hair = curve_object.type == "CURVES"
+    if not hair and curve_object.data.shape_keys is not None:
+        raise InputError(
+            f'"{curve_object.name}" has shape keys, which would hide its new points. Remove them '
+            "first"
+        )
+    strands = curve_object.data.curves if hair else curve_object.data.splines
+    if len(strands) > count:
+        raise InputError(
+            f'"{curve_object.name}" also contains splines that were not designed. Separate them '
+            "first (Curve > Separate in Edit Mode)"
+        )
+
+
+def make_single_user(curve_object: bpy.types.Object) -> None:
+    """Give a linked duplicate data of its own."""
+    if curve_object.data.users - curve_object.data.use_fake_user > 1:
+        curve_object.data = curve_object.data.copy()
+
+
+def copy_materials(source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Add the materials of a curve object to another one, linked to object or data as there."""
+    for slot in source.material_slots:
+        target.data.materials.append(slot.material)
+        if slot.link == "OBJECT":
+            own = target.material_slots[-1]
+            own.link, own.material = "OBJECT", slot.material
+
+
 def write_splines(curve_object: bpy.types.Object, splines: list[Spline]) -> None:
-    """Replace the splines of a curve object; their materials, radii and tilts are kept."""
+    """Replace the splines of a curve object; their settings, radii and tilts are kept."""
     curve = curve_object.data
     before = [_Profile(spline) for spline in curve.splines]
     if not splines:  # the points are lost, so their radii cannot be kept
@@ -132,7 +189,7 @@ def write_splines(curve_object: bpy.types.Object, splines: list[Spline]) -> None
 def largest_point_radius(curve_object: bpy.types.Object) -> float:
     """The largest radius of the points, a factor of the bevel depth; 1 if there is none."""
     splines = curve_object.data.splines
-    radii = [_get(_points_of(spline), "radius").max(initial=0.0) for spline in splines]
+    radii = [_values(spline, "radius").max(initial=0.0) for spline in splines]
     return float(max(radii, default=0.0)) or 1.0
 
 
@@ -162,19 +219,24 @@ def _bezier_spline(curve_object: bpy.types.Object, knots: Knots) -> bpy.types.Sp
 
 
 class _Profile:
-    """The material of a spline, with its radii and tilts as functions of arc length."""
+    """The settings of a spline, with its radii and tilts as functions of arc length."""
 
+    SETTINGS = (
+        *("material_index", "use_smooth", "resolution_u"),
+        *("radius_interpolation", "tilt_interpolation"),
+    )
     NEUTRAL = (("radius", 1.0), ("tilt", 0.0))
 
     def __init__(self, spline: bpy.types.Spline) -> None:
-        self.material = spline.material_index
+        self.settings = {name: getattr(spline, name) for name in self.SETTINGS}
         self.along = _along(spline)
-        self.values = {name: _get(_points_of(spline), name) for name, _ in self.NEUTRAL}
+        self.values = {name: _values(spline, name) for name, _ in self.NEUTRAL}
         self.cyclic = spline.use_cyclic_u
 
     def give_to(self, spline: bpy.types.Spline) -> None:
-        """Apply the material to a spline, and interpolate radii and tilts by arc length."""
-        spline.material_index = self.material
+        """Apply the settings to a spline, and interpolate radii and tilts by arc length."""
+        for name, value in self.settings.items():
+            setattr(spline, name, value)
         for name, neutral in self.NEUTRAL:
             values = self.values[name]
             if len(values) and (values != neutral).any():
@@ -189,6 +251,11 @@ def _points_of(spline: bpy.types.Spline) -> bpy.types.bpy_prop_collection:
     return spline.bezier_points if spline.type == "BEZIER" else spline.points
 
 
+def _values(spline: bpy.types.Spline, name: str) -> np.ndarray:
+    """Values of a property at the points of a spline, (n,)."""
+    return mesh_arrays.read(_points_of(spline), name, 1, np.float32)
+
+
 def _along(spline: bpy.types.Spline) -> np.ndarray:
     """Arc length at each point as a fraction of the total.
 
@@ -196,19 +263,12 @@ def _along(spline: bpy.types.Spline) -> np.ndarray:
     """
     points = _points_of(spline)
     width = 3 if spline.type == "BEZIER" else 4
-    places = np.empty((len(points), width), dtype=np.float32)
-    points.foreach_get("co", places.ravel())
+    places = mesh_arrays.read(points, "co", width, np.float32)
     if spline.use_cyclic_u:
         places = np.concatenate([places, places[:1]])
     lengths = np.linalg.norm(np.diff(places[:, :3].astype(np.float64), axis=0), axis=1)
     along = np.append(0.0, np.cumsum(lengths))
     return along / max(along[-1], 1e-30)
-
-
-def _get(points: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:
-    values = np.empty(len(points), dtype=np.float32)
-    points.foreach_get(name, values)
-    return values
 
 
 def place(

@@ -18,7 +18,6 @@ from ..scene import (
     curve_record,
     design_request,
     junctions,
-    mesh_data,
     mirror_images,
     mirror_plane,
     point_lists,
@@ -29,7 +28,7 @@ from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest
 from ..scene.junctions import OtherCurve
 from ..scene.lookup import by_uid
-from ..scene.messages import InputError, counted, sentence
+from ..scene.messages import NO_MESH_OR_CURVE, InputError, counted, sentence
 from ..scene.mirror_images import Images
 from ..scene.mirror_plane import Mirror
 from ..scene.surface import Surface, active_modifiers_text
@@ -180,12 +179,12 @@ def chosen(context: bpy.types.Context, name: str) -> bpy.types.Object | None:
 def active(context: bpy.types.Context) -> bpy.types.Object | None:
     """The designed curve that is being drawn, or None.
 
-    It is the active object. In Sculpt Mode and Weight Paint, where the mesh has to be active, it is
-    the selected curve on that mesh, if exactly one is selected.
+    It is the active object, unless that is hidden. In Sculpt Mode and Weight Paint, where the mesh
+    has to be active, it is the selected curve on that mesh, if exactly one is selected.
     """
     found = context.active_object
     if curve_record.has_record(found):
-        return found
+        return found if found.visible_get() else None
     if found is None or found.type != "MESH" or found.mode not in {"SCULPT", "WEIGHT_PAINT"}:
         return None
     curves = [
@@ -220,7 +219,7 @@ def open_curve(
     remarks: list[str] = []
     if edited is not None:
         settings = _without_missing_maps(mesh_object, settings, remarks)
-    opened = _opened_on(mesh_object, edited, settings, remarks)
+    opened = _opened_on(mesh_object, settings, edited, remarks)
     if edited is not None:
         kept = _settings_that_keep_the_curve(before, settings, keeps_course)
         opened = _with_recorded_points(opened, edited, kept == before, remarks)
@@ -229,8 +228,8 @@ def open_curve(
 
 def _opened_on(
     mesh_object: bpy.types.Object,
-    edited: bpy.types.Object | None,
     settings: CurveSettings,
+    edited: bpy.types.Object | None,
     remarks: list[str],
 ) -> Opened:
     """A mesh opened for a curve, or for a new one, without control points; it may add a remark."""
@@ -257,11 +256,7 @@ def _opened_on(
 
 def open_new(context: bpy.types.Context) -> Opened:
     """Open the active mesh, or that of the active curve, for a new curve."""
-    mesh_object = curve_record.mesh_of_context(context)
-    if mesh_object is None:
-        raise InputError("Make a mesh or a designed curve active")
-    panel = curve_record.settings_from(context.scene.nicmm_curves)
-    return _opened_on(mesh_object, None, replace(panel, method="ELASTIC"), [])
+    return _opened_on(*_mesh_and_new_settings(context), None, [])
 
 
 def _mesh_and_settings(
@@ -272,9 +267,16 @@ def _mesh_and_settings(
         mesh_object = curve_record.mesh_in_view_layer(context, edited)
         writing.check_replaceable(edited)
         return mesh_object, curve_record.settings_of(edited)
-    mesh_object = mesh_data.mesh_object(context)
+    return _mesh_and_new_settings(context)
+
+
+def _mesh_and_new_settings(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object, CurveSettings]:
+    """The active mesh, or that of the active curve, and the settings of a new curve on it."""
+    mesh_object = curve_record.mesh_of_context(context)
     if mesh_object is None:
-        raise InputError("Make a mesh or a designed curve active")
+        raise InputError(NO_MESH_OR_CURVE)
     panel = curve_record.settings_from(context.scene.nicmm_curves)
     return mesh_object, replace(panel, method="ELASTIC")
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Applies a cut of the core to a Blender mesh and interpolates all attributes of the mesh.
+"""Applies a cut of the core to a Blender mesh and interpolates the attributes of the mesh.
 
 Faces that the curve does not touch stay unchanged. Blender itself interpolates every layer of the
-mesh at new vertices, corners and edges: weights, shape keys, colours and each UV map. Corners are
-interpolated within one face, so values do not mix across seams.
+mesh at new vertices, corners and edges: weights, shape keys, colours and each UV map. Integers are
+those of the nearest vertex or corner. Corners are interpolated within one face, so values do not
+mix across seams.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 import bmesh
 
+from ..scene import mesh_arrays
 from ..scene.messages import InputError
 from ..scene.surface import Surface
 
@@ -86,9 +88,8 @@ class CornerNormals:
         mesh = mesh_object.data
         self.has_values = mesh.has_custom_normals and mesh_object.mode == "OBJECT"
         if self.has_values:
-            self.values = np.empty((len(mesh.loops), 3), dtype=np.float32)
-            mesh.corner_normals.foreach_get("vector", self.values.ravel())
-            self.loop_starts = _loop_starts(mesh)
+            self.values = mesh_arrays.read(mesh.corner_normals, "vector", 3, np.float32)
+            self.loop_starts = mesh_arrays.read(mesh.polygons, "loop_start", 1, np.int32)
 
     def after_cut(
         self, surface: Surface, cut: CutMesh, polygons: CutPolygons, weights: np.ndarray
@@ -110,12 +111,6 @@ class CornerNormals:
 
 def _integers(values: list[int]) -> np.ndarray:
     return np.asarray(values, dtype=np.int64)
-
-
-def _loop_starts(mesh: bpy.types.Mesh) -> np.ndarray:
-    starts = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", starts)
-    return starts
 
 
 def apply(
@@ -242,7 +237,7 @@ class _SourceTriangles:
         old_faces: dict[int, bmesh.types.BMFace],
     ) -> None:
         self.edited, self.surface, self.old_faces = edited, surface, old_faces
-        self.loop_starts = _loop_starts(mesh)
+        self.loop_starts = mesh_arrays.read(mesh.polygons, "loop_start", 1, np.int32)
         self.faces: dict[int, bmesh.types.BMFace] = {}
         self.helper_vertices: list[bmesh.types.BMVert] = []
 

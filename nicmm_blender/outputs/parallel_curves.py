@@ -29,6 +29,9 @@ from .clean_curves import BEZIER, EVEN, EXACT, Drawing, splines
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve
 
+UNKNOWN = -1
+"""Number of splines of an object on which it was not stored."""
+
 LARGEST_COUNT = 100
 """Greatest number of curves on a side, since each takes about as long as a curve."""
 
@@ -96,9 +99,15 @@ def _note_change(group: bpy.types.PropertyGroup, _context: bpy.types.Context) ->
 class NICMM_PG_parallel(bpy.types.PropertyGroup):
     """Settings of an object with parallel curves. A change computes the curves again"""
 
-    source: PointerProperty(type=bpy.types.Object, options={"HIDDEN"})
+    source: PointerProperty(
+        name="Source",
+        description="The designed curve to which these curves are parallel",
+        type=bpy.types.Object,
+        options={"HIDDEN"},
+    )
     is_parallel: BoolProperty(options={"HIDDEN"})
     problem: StringProperty(options={"HIDDEN"})
+    n_splines: IntProperty(default=UNKNOWN, options={"HIDDEN"})
     distance: _live(DISTANCE)
     count: _live(COUNT)
     both_sides: _live(BOTH_SIDES)
@@ -127,22 +136,10 @@ def source_of(parallel: bpy.types.Object) -> bpy.types.Object:
     return source
 
 
-def add(
-    context: bpy.types.Context,
-    source: bpy.types.Object,
-    surface: Surface,
-    curves: list[SurfaceCurve],
-    settings: ParallelSettings,
-) -> tuple[bpy.types.Object, int]:
-    """Add an object with curves parallel to the curves of a designed object.
-
-    Returns
-    -------
-    bpy.types.Object
-    int
-        The number of parallel curves.
-    """
-    mesh_object = curve_record.mesh_in_any_scene(source)
+def computed(
+    surface: Surface, curves: list[SurfaceCurve], settings: ParallelSettings
+) -> list[SurfaceCurve]:
+    """The curves parallel to some curves; an error if there are none."""
     check_finite("parallel_distance", settings.parallel_distance)
     distances = _distances(settings.parallel_distance, settings.parallel_count, settings.both_sides)
     found = _parallels(surface, curves, distances)
@@ -151,21 +148,40 @@ def add(
             "No place on that side of the curve is so far away. Use a smaller Distance, or the "
             "other side"
         )
+    return found
+
+
+def add(
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    surface: Surface,
+    found: list[SurfaceCurve],
+    settings: ParallelSettings,
+) -> bpy.types.Object:
+    """Add an object with curves parallel to those of a designed object, from `computed`."""
+    mesh_object = curve_record.mesh_in_any_scene(source)
     drawn = curve_record.drawn_as(source)
     radius = tube_radius.radius_of(source) * curve_object.scale_of(source, surface)
     shown = splines(surface, found, Drawing(radius=radius, **drawn), np.zeros(0, dtype=bool))
     parallel = curve_object.new_object(mesh_object, surface, shown, radius)
     parallel.name = f"{source.name} Parallel"
-    for material in source.data.materials:
-        parallel.data.materials.append(material)
+    curve_object.copy_materials(source, parallel)
     group = parallel.nicmm_parallel
+    group.n_splines = len(shown)
     group.distance, group.count = settings.parallel_distance, settings.parallel_count
     group.both_sides = settings.both_sides
     group.spline, group.offset = drawn["spline"], drawn["offset"]
     group.source = source
     group.is_parallel = True  # the last one, since changes of the others are noticed from here on
     curve_object.place(context, mesh_object, parallel)
-    return parallel, len(found)
+    return parallel
+
+
+def set_source(converted: bpy.types.Object, original: bpy.types.Object) -> None:
+    """Let the curves that are parallel to an original curve follow the converted one."""
+    for parallel in bpy.data.objects:
+        if parallel.nicmm_parallel.source == original:
+            parallel.nicmm_parallel.source = converted
 
 
 def follow(source: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
@@ -209,6 +225,8 @@ def _read_source(parallel: bpy.types.Object) -> tuple[Surface, list[SurfaceCurve
 def _redraw(parallel: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
     """Replace the splines of parallel curves; radius and materials are kept."""
     group = parallel.nicmm_parallel
+    count = len(parallel.data.splines) if group.n_splines == UNKNOWN else group.n_splines
+    curve_object.check_replaceable(parallel, count)
     for name in ("distance", "offset"):
         check_finite(name, getattr(group, name))
     distances = _distances(group.distance, group.count, group.both_sides)
@@ -220,7 +238,10 @@ def _redraw(parallel: bpy.types.Object, surface: Surface, curves: list[SurfaceCu
         )
     radius = tube_radius.radius_of(parallel) * curve_object.scale_of(parallel, surface)
     drawing = Drawing(group.spline, radius, group.offset)
-    curve_object.write_splines(parallel, splines(surface, found, drawing, np.zeros(0, dtype=bool)))
+    shown = splines(surface, found, drawing, np.zeros(0, dtype=bool))
+    curve_object.make_single_user(parallel)
+    curve_object.write_splines(parallel, shown)
+    group.n_splines = len(shown)
 
 
 def _distances(distance: float, count: int, both_sides: bool) -> list[float]:
@@ -233,8 +254,9 @@ def _parallels(
     surface: Surface, curves: list[SurfaceCurve], distances: list[float]
 ) -> list[SurfaceCurve]:
     """The curves at some distances from curves, in scene units."""
-    # A reflection exchanges left and right.
-    handedness = float(np.sign(np.linalg.det(surface.local_to_core)))
+    # A reflection exchanges left and right. The core knows the sides by the order of the corners of
+    # faces, which is the same in local space and in its own.
+    handedness = float(np.sign(np.linalg.det(surface.local_to_world[:3, :3])))
     lengths = [handedness * distance / surface.unit for distance in distances]
     with surface_cache.designer_of(surface) as designer:
         return [

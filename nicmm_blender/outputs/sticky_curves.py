@@ -16,7 +16,7 @@ import numpy as np
 from ..scene.surface import Surface
 from . import sticky_nodes
 from .clean_curves import Drawing, on_surface
-from .curve_object import parent_to_mesh, scale_of, to_object_space
+from .curve_object import is_reflected, parent_to_mesh, scale_of, to_object_space
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve
@@ -95,7 +95,10 @@ def write(
     vertices = np.full(len(faces), len(surface.local_positions))
     _set(data, sticky_nodes.VERTICES, "INT", "POINT", vertices)
     _set(data, sticky_nodes.BARYCENTRIC, "FLOAT_VECTOR", "POINT", barycentric)
-    offset = np.full(len(faces), drawing.offset / scale_of(curve_object, surface))
+    # A reflection of a mesh in Blender leaves the order of corners, so normals point inwards.
+    outwards = -1.0 if is_reflected(curve_object) else 1.0
+    height = outwards * drawing.offset / scale_of(curve_object, surface)
+    offset = np.full(len(faces), height)
     _set(data, sticky_nodes.OFFSET, "FLOAT", "POINT", offset)
     cage_corners, cage_offset = on_cage(surface, faces, barycentric)
     _set(data, sticky_nodes.CAGE_OFFSET, "FLOAT_VECTOR", "POINT", cage_offset)
@@ -159,8 +162,11 @@ def on_cage(
         return surface.faces[faces], np.stack([*barycentric.T[1:], flat], axis=1)
     cage = surface.cage
     polygons = cage.faces[faces]
-    corners = np.where(polygons[:, None] >= 0, cage.corners[polygons], -1)
-    in_front = (cage.vertices[corners] == corners).all(axis=1) & (polygons >= 0)
+    known = np.flatnonzero(polygons >= 0)
+    corners = np.full((len(faces), 3), -1)
+    corners[known] = cage.corners[polygons[known]]
+    in_front = np.zeros(len(faces), dtype=bool)
+    in_front[known] = (cage.vertices[corners[known]] == corners[known]).all(axis=1)
     first, second, last = np.moveaxis(
         surface.local_positions[np.where(in_front[:, None], corners, 0)], 1, 0
     )

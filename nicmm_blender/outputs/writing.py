@@ -12,7 +12,7 @@ import numpy as np
 
 import bmesh
 
-from ..scene import curve_record, mirror_images
+from ..scene import curve_record, mirror_images, surface_cache
 from ..scene.curve_record import CurveSettings, Drawn
 from ..scene.design_request import DesignRequest, corners_of
 from ..scene.junctions import OtherCurve
@@ -104,6 +104,9 @@ def apply(
     via points, and `others` the curves that they avoid.
     """
     if settings.output in (*SEPARATE, PARALLEL):
+        parallel = []
+        if settings.output == PARALLEL:
+            parallel = parallel_curves.computed(surface, curves, settings)
         new_object = as_object(mesh_object, surface, curves, settings, corners, mirror)
         drawn = drawn_as(settings)
         controls = _controls(curves, corners, mirror)
@@ -120,9 +123,9 @@ def apply(
             others,
         )
         curve_object.place(context, mesh_object, new_object)
-        if settings.output == PARALLEL:
-            _, count = parallel_curves.add(context, new_object, surface, curves, settings)
-            return counted(count, "parallel curve")
+        if parallel:
+            parallel_curves.add(context, new_object, surface, parallel, settings)
+            return counted(len(parallel), "parallel curve")
         return counted(sum(len(curve.faces) for curve in curves), "curve point")
     if mirror is not None and not mirror.joined:
         raise InputError(
@@ -181,8 +184,7 @@ def redraw(
     linked duplicate gets data of its own, since its record describes only its own curve.
     """
     corners = mirror_images.corners_along(curves, corners, mirror)
-    if drawn.data.users - drawn.data.use_fake_user > 1:
-        drawn.data = drawn.data.copy()
+    curve_object.make_single_user(drawn)
     if curve_object.is_child(drawn):
         _parent_again(drawn, surface)
     radius = tube_radius.radius_of(drawn) * curve_object.scale_of(drawn, surface)
@@ -222,30 +224,7 @@ def drawn_as(settings: ObjectSettings) -> Drawn:
 
 def check_replaceable(designed: bpy.types.Object) -> None:
     """Raise an error if the points of a curve object cannot be replaced."""
-    library = designed.library or designed.data.library
-    if library is not None:
-        raise InputError(
-            f'"{designed.name}" is linked from {library.filepath}. '
-            "Make it local (Object > Relations > Make Local)"
-        )
-    if designed.override_library or designed.data.override_library:
-        raise InputError(
-            f'"{designed.name}" is a library override, and Blender would not save its new points. '
-            "Make it local (Object > Relations > Make Local)"
-        )
-    if designed.mode != "OBJECT":
-        raise InputError(f'"{designed.name}" is being edited. Switch to Object Mode first')
-    hair = designed.type == "CURVES"
-    if not hair and designed.data.shape_keys is not None:
-        raise InputError(
-            f'"{designed.name}" has shape keys, which would hide its new points. Remove them first'
-        )
-    strands = designed.data.curves if hair else designed.data.splines
-    if len(strands) > max(1, curve_record.number_of_curves(designed)):
-        raise InputError(
-            f'"{designed.name}" also contains splines that were not designed. Separate them first '
-            "(Curve > Separate in Edit Mode)"
-        )
+    curve_object.check_replaceable(designed, curve_record.number_of_curves(designed))
 
 
 def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design | Exception) -> None:
@@ -288,7 +267,7 @@ def _cutting(
     from ... import nicmm_core as nicmm
     from ...nicmm_core.outputs.polygons import cut_polygons
 
-    core_mesh = nicmm.Mesh(surface.core_positions, surface.faces)
+    core_mesh = surface_cache.core_mesh(surface)
     deviation = settings.simplify * core_mesh.mean_edge_length
     cut = nicmm.cut_mesh(core_mesh, curve, deviation=deviation)
     joined = joined and settings.cut_faces == "POLYGONS"
@@ -328,8 +307,6 @@ def _region(
     cutting = _cutting(mesh_object, surface, curve, settings)
     region = _enclosed(cutting, settings.other_side)
     normals = mesh_cut.CornerNormals(mesh_object) if settings.region_cut else None
-    if settings.region_as == "VERTEX_GROUP":
-        group = mesh_object.vertex_groups.new(name=REGION_NAME)
     if settings.region_as == "SELECTION":
         context.tool_settings.mesh_select_mode = (False, False, True)
     with mesh_cut.editable(mesh_object) as edited:
@@ -350,6 +327,7 @@ def _region(
             for face in chosen:
                 face[layer] = number
         else:
+            group = mesh_object.vertex_groups.new(name=REGION_NAME)
             for index in np.flatnonzero(on_vertex).tolist():
                 vertices[index][layer][group.index] = 1.0
     if normals is not None:
@@ -387,10 +365,10 @@ def _part_as_object(
 ) -> str:
     mesh_object = cutting.mesh_object
     inside = _faces_inside(cutting, region)
-    other_data = mesh_object.data.copy()
     with mesh_cut.editable(mesh_object) as edited:
         layer = edited.faces.layers.int.new(INSIDE)
         vertices, faces = _cut_in_blender(edited, cutting)
+        other_data = mesh_object.data.copy()
         edges = _chain_edges(edited, cutting, vertices)
         for index in np.flatnonzero(inside).tolist():
             faces[index][layer] = 1

@@ -19,6 +19,7 @@ import numpy as np
 from .isolation import evaluated_in_isolation
 from .mesh_arrays import corner_vertices, read, triangle_faces
 from .mesh_arrays import positions as positions_of
+from .vertex_weights import add_missing_groups
 
 if TYPE_CHECKING:
     from .surface import Surface
@@ -247,6 +248,7 @@ class _Copy:
         """Evaluate the copy and read its attributes."""
         copy = self.mesh_object.copy()
         copy.data = self.cage.copy()
+        add_missing_groups(copy, self.mesh_object.vertex_groups.keys())
         if self.mesh_object.mode == "EDIT":
             for modifier in copy.modifiers:
                 modifier.show_viewport = modifier.show_viewport and modifier.show_in_editmode
@@ -262,7 +264,8 @@ class _Copy:
         coordinates = np.zeros((len(data.loops), 3), dtype=np.float32)
         number = np.arange(len(coordinates)) - np.repeat(starts, totals)
         coordinates[:, :2] = _on_circle(number, np.repeat(totals, totals))
-        faces = np.arange(len(data.polygons), dtype=np.int32)
+        # Counted from 1, since Blender gives 0 to faces that come from no other face.
+        faces = np.arange(1, 1 + len(data.polygons), dtype=np.int32)
         for name, kind, domain, field, values in (
             (VERTEX, "FLOAT_VECTOR", "POINT", "vector", self.identities),
             (FACE, "INT", "FACE", "value", faces),
@@ -291,7 +294,7 @@ class _Copy:
                     self.identities, read(kept[VERTEX].data, "vector", 3, np.float32)
                 )
             if FACE in kept and FACE_COORDINATES in kept and not collapses:
-                number = read(kept[FACE].data, "value", 1, np.int32)
+                number = read(kept[FACE].data, "value", 1, np.int32) - 1
                 faces = number[triangle_faces(shown)].astype(np.int64)
                 coordinates = read(kept[FACE_COORDINATES].data, "vector", 3, np.float32)[loops, :2]
         starts = read(self.cage.polygons, "loop_start", 1, np.int32)
@@ -308,6 +311,8 @@ def _have_equal_faces(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
 
 def _first_equal(wanted: np.ndarray, among: np.ndarray) -> np.ndarray:
     """For each row of `wanted`, the first row of `among` with the same bytes, or -1."""
+    if not len(wanted):
+        return np.zeros(0, dtype=np.int64)
     known, order = np.unique(_keys(wanted), return_index=True)
     keys = _keys(among)
     at = np.minimum(np.searchsorted(known, keys), len(known) - 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from . import mesh_arrays
 from .messages import InputError
 
 
@@ -33,11 +34,8 @@ def synchronise(mesh_object: bpy.types.Object) -> None:
 def marked_edges(mesh_object: bpy.types.Object, mark: str) -> np.ndarray:
     """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
     edges = mesh_object.data.edges
-    marked = np.empty(len(edges), dtype=bool)
-    edges.foreach_get(mark, marked)
-    vertices = np.empty((len(edges), 2), dtype=np.int32)
-    edges.foreach_get("vertices", vertices.ravel())
-    return vertices[marked].astype(np.int64)
+    vertices = mesh_arrays.read(edges, "vertices", 2, np.int32)
+    return vertices[mesh_arrays.read(edges, mark, 1, bool)].astype(np.int64)
 
 
 def check_local(mesh_object: bpy.types.Object, consequence: str) -> None:

@@ -28,6 +28,10 @@ MIRROR_WORDS = {
 """What the core says about mirrors, and the words for it in Blender."""
 
 
+NO_MESH_OR_CURVE = "Make a mesh or a designed curve active"
+"""Message for an active object of the wrong type."""
+
+
 class InputError(Exception):
     """Blender's data cannot be used; the message says what to change."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 import bmesh
 
-from . import surface_cache
+from . import mesh_arrays, surface_cache
 from .cage_trace import CageTrace
 from .messages import InputError
 from .surface import Surface, group_weights
@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 
 def selected_vertices(mesh_object: bpy.types.Object) -> np.ndarray:
     """Indices of the selected vertices, ascending."""
-    mesh = mesh_object.data
-    selected = np.empty(len(mesh.vertices), dtype=bool)
-    mesh.vertices.foreach_get("select", selected)
-    return np.flatnonzero(selected)
+    return np.flatnonzero(mesh_arrays.read(mesh_object.data.vertices, "select", 1, bool))
 
 
 def selection_history(mesh_object: bpy.types.Object) -> np.ndarray:

@@ -51,7 +51,7 @@ class Surface:
     polygons : (F,) int array
         Face of the Blender mesh that each triangle belongs to.
     hidden : (F,) bool array
-        Whether the user has hidden the triangle; always False in Object Mode.
+        Whether the user has hidden the triangle; always False in modes that show hidden faces.
     local_to_core : (3, 3) float array
         Linear map from local space to the space of the core.
     local_to_world : (4, 4) float array

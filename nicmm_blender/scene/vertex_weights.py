@@ -18,13 +18,12 @@ def weights_on(mesh: bpy.types.Mesh, groups: list[str], group: str) -> np.ndarra
     """Weights (V,) of all vertices of a mesh in a vertex group; 0 outside the group.
 
     `mesh` may be the evaluated mesh of an object. It is not changed. `groups` are the names of all
-    vertex groups of the object: a copy of an edited mesh has weights without names.
+    vertex groups of the object.
     """
     nodes = _new_node_group(group)
     try:
         temporary = bpy.data.objects.new("NICMM weights", mesh.copy())
-        for name in groups[len(temporary.vertex_groups) :]:
-            temporary.vertex_groups.new(name=name)
+        add_missing_groups(temporary, groups)
         temporary.modifiers.new("NICMM weights", "NODES").node_group = nodes
         with evaluated_in_isolation(temporary) as stored:
             weights = np.zeros(len(stored.vertices), dtype=np.float32)
@@ -32,6 +31,12 @@ def weights_on(mesh: bpy.types.Mesh, groups: list[str], group: str) -> np.ndarra
     finally:
         bpy.data.node_groups.remove(nodes)
     return weights.astype(np.float64)
+
+
+def add_missing_groups(copy: bpy.types.Object, groups: list[str]) -> None:
+    """Name all vertex groups of a copy; that of an edited mesh has weights without names."""
+    for name in groups[len(copy.vertex_groups) :]:
+        copy.vertex_groups.new(name=name)
 
 
 def _new_node_group(group: str) -> bpy.types.NodeTree:

@@ -50,8 +50,9 @@ class ViaPoints:
         return self._subset(np.flatnonzero(self.legs != leg))
 
     def inserted(self, number: int, leg: int, place: SurfacePoints) -> ViaPoints:
-        """With another via point, which gets an index among them."""
-        return ViaPoints(np.insert(self.legs, number, leg), with_point(self.points, number, place))
+        """With another via point, which gets an index among them if its leg allows that."""
+        legs = np.insert(self.legs, number, leg)
+        return sorted_by_leg(legs, with_point(self.points, number, place))
 
     def moved(self, number: int, place: SurfacePoints) -> ViaPoints:
         """With one of them at another place."""

@@ -150,6 +150,8 @@ TABLE = {
     "Count": "Anzahl",
     "Number of parallel curves on each side": "Anzahl paralleler Kurven auf jeder Seite",
     "Both Sides": "Beide Seiten",
+    "Source": "Quelle",
+    "The designed curve to which these curves are parallel": "Die entworfene Kurve, zu der diese Kurven parallel sind",
     "Also create parallel curves on the other side": "Auch auf der anderen Seite parallele Kurven erstellen",
     "Spline": "Spline",
     "How the points of the curve object are placed": "Wie die Punkte des Kurvenobjekts verteilt sind",

@@ -150,6 +150,8 @@ TABLE = {
     "Count": "数",
     "Number of parallel curves on each side": "片側の平行カーブの数",
     "Both Sides": "両側",
+    "Source": "ソース",
+    "The designed curve to which these curves are parallel": "これらのカーブが平行に沿うデザインカーブ",
     "Also create parallel curves on the other side": "反対側にも平行カーブを作成します",
     "Spline": "スプライン",
     "How the points of the curve object are placed": "カーブオブジェクトの点の配置",

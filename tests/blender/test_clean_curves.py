@@ -5,7 +5,7 @@ import igl
 import numpy as np
 import pytest
 
-from mathutils import Euler
+from mathutils import Euler, Matrix
 
 from tests.blender import scenes
 from tests.blender.test_shown_surface import CHOSEN, curve_deviation, in_world, shown
@@ -189,21 +189,38 @@ def test_offset_lifts_the_curve_off_the_skin(monkey, output, spline):
     assert outside > np.linalg.norm(base - centre, axis=1).mean()
 
 
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-1, 2, 1), (1, -1, -1.5)])
-def test_offset_is_outwards_also_on_mirrored_objects(empty_scene, scale):
+def test_offset_is_outwards_also_on_mirrored_objects(empty_scene, scale, output):
     sphere = scenes.sphere()
     sphere.scale = scale
     bpy.context.view_layer.update()
     scenes.select(sphere, scenes.ring(sphere, 4))
-    bpy.ops.nicmm.design_curve(offset=0.05)
+    bpy.ops.nicmm.design_curve(offset=0.05, output=output)
     lengths = np.linalg.norm(in_world(bpy.context.active_object) / np.abs(scale), axis=1)
     assert lengths.min() > 1.01
+
+
+def test_offset_is_outwards_without_the_parent(empty_scene):
+    key = scenes.module(empty_scene, "scene.curve_record").RECORD_KEY
+    sphere = scenes.sphere()
+    sphere.scale = (-1, 1, 1)
+    bpy.context.view_layer.update()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve(output="STICKY")
+    curve = bpy.context.active_object
+    curve.parent, curve.matrix_parent_inverse = None, Matrix()
+    curve[key]["drawn"]["offset"] = 0.05
+    bpy.context.view_layer.update()
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert np.linalg.norm(in_world(curve), axis=1).min() > 1.01
 
 
 @pytest.mark.slow
 def test_radii_tilts_and_materials_survive_an_update(monkey):
     curve = draw(monkey, closed=False)
     curve.data.materials.append(bpy.data.materials.new("Red"))
+    curve.data.splines[0].use_smooth = False
     points = curve.data.splines[0].points
     taper = np.linspace(1.0, 0.1, len(points), dtype=np.float32)
     points.foreach_set("radius", taper)
@@ -218,6 +235,23 @@ def test_radii_tilts_and_materials_survive_an_update(monkey):
     assert (np.diff(radii) < 0.0).all()
     np.testing.assert_allclose(tilts, 2.0 * radii, rtol=1e-5)
     assert [found.name for found in curve.data.materials] == ["Red"]
+    assert not curve.data.splines[0].use_smooth
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY", "PARALLEL"])
+def test_materials_of_the_object_are_kept(empty_scene, output):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve()
+    curve = bpy.context.active_object
+    for name, link in (("Of Data", "DATA"), ("Of Object", "OBJECT")):
+        curve.data.materials.append(None)
+        slot = curve.material_slots[-1]
+        slot.link, slot.material = link, bpy.data.materials.new(name)
+    assert bpy.ops.nicmm.convert_curve(output=output) == {"FINISHED"}
+    slots = bpy.context.active_object.material_slots
+    found = [(slot.link, slot.material.name) for slot in slots]
+    assert found == [("DATA", "Of Data"), ("OBJECT", "Of Object")]
 
 
 @pytest.mark.slow

@@ -154,3 +154,59 @@ def test_no_place_so_far_away_is_an_error(equator):
     with pytest.raises(RuntimeError, match="smaller Distance"):
         bpy.ops.nicmm.convert_curve(output="PARALLEL", parallel_distance=5.0)
     assert len(scenes.curves()) == 1
+
+
+def test_nothing_is_left_of_a_new_curve_without_parallel_curves(empty_scene):
+    ball = scenes.sphere(3)
+    scenes.select(ball, scenes.ring(ball, 4))
+    with pytest.raises(RuntimeError, match="smaller Distance"):
+        bpy.ops.nicmm.design_curve(output="PARALLEL", parallel_distance=5.0)
+    assert not scenes.curves() and not bpy.data.curves
+    assert bpy.context.active_object is ball
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-1, 1, 1.5), (-1, -1, -2)])
+def test_left_is_left_as_seen_from_outside_whatever_the_scale(empty_scene, scale):
+    ball = scenes.sphere(4)
+    ball.scale = scale
+    bpy.context.view_layer.update()
+    scenes.select(ball, scenes.ring(ball, 6))
+    assert bpy.ops.nicmm.design_curve(order="GIVEN") == {"FINISHED"}
+    curve = bpy.context.active_object
+    points = scenes.points(curve) * scale
+    area = np.cross(points, np.roll(points, -1, axis=0))[:, 2].sum()
+    height = (scenes.points(add())[:, 2] * scale[2]).mean()
+    assert np.sign(height) == np.sign(area)
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+def test_parallel_curves_follow_the_curve_that_is_converted(equator, output):
+    parallel = add()
+    scenes.activate(equator)
+    assert bpy.ops.nicmm.convert_curve(output=output) == {"FINISHED"}
+    assert parallel.nicmm_parallel.source is bpy.context.active_object
+    parallel.nicmm_parallel.distance = 0.3
+    assert not parallel.nicmm_parallel.problem
+    np.testing.assert_allclose(np.abs(latitudes(parallel)), 0.3, rtol=1e-2)
+
+
+def test_a_linked_duplicate_gets_curves_of_its_own(equator):
+    parallel = add()
+    bpy.ops.object.duplicate_move_linked()
+    duplicate = bpy.context.active_object
+    before = scenes.points(parallel)
+    duplicate.nicmm_parallel.distance = -0.3
+    np.testing.assert_array_equal(scenes.points(parallel), before)
+    np.testing.assert_allclose(np.abs(latitudes(duplicate)), 0.3, rtol=1e-2)
+
+
+def test_splines_that_were_joined_are_not_lost(equator):
+    parallel = add()
+    bpy.ops.curve.primitive_bezier_circle_add()
+    other = bpy.context.active_object
+    scenes.activate(parallel)
+    other.select_set(True)
+    bpy.ops.object.join()
+    parallel.nicmm_parallel.distance = 0.1
+    assert len(parallel.data.splines) == 2
+    assert "Separate them first" in parallel.nicmm_parallel.problem

@@ -476,3 +476,48 @@ def test_hidden_faces_are_known_in_edit_mode(monkey, empty_scene):
     bpy.ops.object.mode_set(mode="EDIT")
     assert surface.read(monkey, True).hidden.any()
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def without_faces(mesh_object):
+    """Replace the mesh by one without faces, which modifiers make into a surface."""
+    data = bpy.data.meshes.new("Edges")
+    turns = np.linspace(0.0, 2 * np.pi, 12, endpoint=False)
+    places = [(1.0 + 0.3 * np.cos(t), 0.0, 0.3 * np.sin(t)) for t in turns]
+    data.from_pydata(places, [(i, (i + 1) % 12) for i in range(12)], [])
+    mesh_object.data = data
+    screw = mesh_object.modifiers.new("Screw", "SCREW")
+    screw.steps = screw.render_steps = 24
+    screw.use_merge_vertices = True
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+def test_a_surface_that_modifiers_make_of_edges(monkey, output):
+    without_faces(monkey)
+    bpy.context.view_layer.update()
+    curve = draw_at(monkey, [(1.3, 0.0, 0.0), (0.0, 1.3, 0.0), (-1.3, 0.0, 0.0)], output)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert curve.type == {"CURVE": "CURVE", "STICKY": "CURVES"}[output]
+
+
+def draw_at(mesh_object, positions, output):
+    """A curve through positions, drawn as with the tool."""
+    scenes.activate(mesh_object)
+    bpy.context.scene.nicmm_curves.output = output
+    points = [{"name": "", "position": position} for position in positions]
+    assert bpy.ops.nicmm.edit_curve("EXEC_DEFAULT", points=points, output=output) == {"FINISHED"}
+    return bpy.context.active_object
+
+
+def test_edit_mode_traces_modifiers_that_use_a_vertex_group(monkey, extension):
+    group = monkey.vertex_groups.new(name="Left")
+    left = np.flatnonzero(scenes.positions(monkey)[:, 0] > 0.2)
+    group.add(left.tolist(), 1.0, "REPLACE")
+    modifier = monkey.modifiers.new("Mask", "MASK")
+    modifier.vertex_group, modifier.invert_vertex_group = "Left", True
+    modifier.show_in_editmode = True
+    surface = module(extension, "scene.surface")
+    outside = surface.read(monkey, True).cage
+    bpy.ops.object.mode_set(mode="EDIT")
+    inside = surface.read(monkey, True).cage
+    assert (outside.faces >= 0).all()
+    np.testing.assert_array_equal(inside.faces, outside.faces)

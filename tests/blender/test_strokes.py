@@ -4,6 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
+from mathutils import Matrix, Vector
+
 from tests.blender import scenes
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
@@ -152,26 +154,74 @@ def test_curves_far_from_the_mesh_are_reported(circle):
     assert len(scenes.curves()) == 1
 
 
-def test_a_grease_pencil_stroke_becomes_a_designed_curve(ball):
+def place_of_layer(layer, kind):
+    """Move a layer, and return the matrix from its space to the world."""
+    if kind == "plain":
+        return Matrix()
+    layer.translation = (0.0, 0.0, 3.0)
+    if kind == "moved":
+        return Matrix.Translation((0.0, 0.0, 3.0))
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.location = (1.0, 2.0, 0.0)
+    layer.parent = parent
+    bpy.context.view_layer.update()
+    return parent.matrix_world @ layer.matrix_parent_inverse @ layer.matrix_local
+
+
+@pytest.mark.parametrize("kind", ["plain", "moved", "parented"])
+def test_a_grease_pencil_stroke_becomes_a_designed_curve(ball, kind):
     pencil = bpy.data.grease_pencils_v3.new("Pencil")
     drawn = bpy.data.objects.new("Pencil", pencil)
     bpy.context.scene.collection.objects.link(drawn)
-    drawing = pencil.layers.new("Lines").frames.new(bpy.context.scene.frame_current).drawing
+    layer = pencil.layers.new("Lines")
+    to_layer = place_of_layer(layer, kind).inverted()
+    drawing = layer.frames.new(bpy.context.scene.frame_current).drawing
     angles = np.linspace(0.0, 2.5, 60)
+    stroke = on_ball(angles, 0.2 * np.sin(angles))
     drawing.add_strokes([len(angles)])
-    for point, place in zip(
-        drawing.strokes[0].points, on_ball(angles, 0.2 * np.sin(angles)), strict=True
-    ):
-        point.position = place
+    for point, place in zip(drawing.strokes[0].points, stroke, strict=True):
+        point.position = to_layer @ Vector(place)
     scenes.activate(ball)
     drawn.select_set(True)
     assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05) == {"FINISHED"}
     made = bpy.context.active_object
     assert made.type == "CURVE" and not made.data.splines[0].use_cyclic_u
-    stroke = on_ball(angles, 0.2 * np.sin(angles))
     assert scenes.distances_to(stroke, scenes.points(made)).max() < 0.08
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_hair_curves_become_designed_curves(ball, cyclic):
+    angles = np.linspace(0.0, 2 * np.pi, 40, endpoint=False)
+    hair = bpy.data.hair_curves.new("Hair")
+    hair.add_curves([len(angles)])
+    places = on_ball(angles, 0.2 * np.sin(angles)).astype(np.float32)
+    hair.points.foreach_set("position", places.ravel())
+    hair.attributes.new("cyclic", "BOOLEAN", "CURVE").data[0].value = cyclic
+    drawn = bpy.data.objects.new("Hair", hair)
+    bpy.context.scene.collection.objects.link(drawn)
+    scenes.activate(ball)
+    drawn.select_set(True)
+    assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05) == {"FINISHED"}
+    assert bpy.context.active_object.data.splines[0].use_cyclic_u == cyclic
 
 
 def test_nothing_selected_disables_the_button(ball):
     scenes.activate(ball)
     assert not bpy.ops.nicmm.strokes_to_curves.poll()
+
+
+def test_the_redo_panel_is_offered(circle):
+    assert bpy.ops.nicmm.strokes_to_curves(tolerance=0.05) == {"FINISHED"}
+    assert bpy.ops.nicmm.strokes_to_curves.poll()
+    with pytest.raises(RuntimeError, match="Select Grease Pencil or curve objects"):
+        bpy.ops.nicmm.strokes_to_curves()
+
+
+def test_a_failure_keeps_the_selection(circle):
+    circle.location.x = 9.0
+    bpy.context.view_layer.update()
+    before = set(bpy.context.selected_objects)
+    with pytest.raises(RuntimeError, match="off the surface"):
+        bpy.ops.nicmm.strokes_to_curves(tolerance=0.05)
+    assert set(bpy.context.selected_objects) == before

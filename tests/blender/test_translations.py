@@ -12,7 +12,7 @@ from tests.blender.scenes import module
 ONLY_IN_SCRIPTS = ("for scripts", "Name of the designed curve", "Name of a designed curve")
 """Parts of tooltips that no user sees in the window."""
 
-INTERNAL = {"source", "is_parallel", "problem"}
+INTERNAL = {"is_parallel", "n_splines", "problem"}
 """Names of properties that are never shown."""
 
 

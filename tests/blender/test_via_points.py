@@ -372,3 +372,9 @@ def test_clicks_on_via_points(empty_scene):
     assert name_of(kind.LINE, **plain)[0] == "insert_point"
     for other in (kind.POINT, kind.SURFACE, kind.CURVE):
         assert name_of(other, **via) is None
+
+
+def test_the_redo_panel_can_put_a_new_via_point_on_another_leg(torus, loop):
+    """The index that the first run has stored may belong to another leg."""
+    call("add_via_point", leg=1, index=3, position=ring(torus, 2.8))
+    assert angles(loop) == [(1, 2.4), (1, 2.8), (3, 5.0), (3, 5.9)]
