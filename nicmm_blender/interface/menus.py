@@ -6,7 +6,7 @@ import bpy
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..operators.next_course import NICMM_OT_next_course
-from ..operators.strokes_to_curves import NICMM_OT_strokes_to_curves
+from ..operators.strokes_to_curves import NICMM_OT_strokes_to_curves, has_strokes
 from ..scene import curve_record
 from ..tool import modes
 from ..tool.edit_operator import NICMM_OT_edit_curve
@@ -45,7 +45,7 @@ def draw_in_context_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> No
 
 def draw_conversions(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     """Draw a submenu with all outputs if a designed curve is active, or the entry for strokes."""
-    if NICMM_OT_strokes_to_curves.poll(context):
+    if has_strokes(context):
         _begin(menu)
         menu.layout.operator(NICMM_OT_strokes_to_curves.bl_idname, icon=icons.STROKES)
     if not curve_record.has_record(context.active_object):

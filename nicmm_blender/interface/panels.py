@@ -128,7 +128,7 @@ class NICMM_PT_measures(SidebarPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         curve = edited_curve.active(context)
-        return curve is not None and curve_record.has_curve(curve)
+        return curve is not None and not curve_record.is_unfinished(curve)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

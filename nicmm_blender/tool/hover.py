@@ -30,10 +30,7 @@ class NICMM_GGT_hover(bpy.types.GizmoGroup):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        active = modes.is_tool_active(context)
-        if not active and overlay.hovered() is not None:
-            overlay.show_hover(None)
-        return active
+        return modes.is_tool_active(context)
 
     def setup(self, _context: bpy.types.Context) -> None:
         self.gizmos.new(NICMM_GT_hover.bl_idname)

@@ -81,8 +81,7 @@ class _State:
         self.dashed = False
         self.plane: gpu.types.GPUBatch | None = None
         self.plane_of: PlaneSection | None = None
-        self.visible: np.ndarray = np.zeros(0, dtype=bool)
-        self.visible_of: tuple[bytes, bool, int, bytes] | None = None
+        self.visible: dict[int, tuple[tuple[object, ...], np.ndarray]] = {}
 
 
 _state = _State()
@@ -107,11 +106,6 @@ def show_hover(hit: picking.Hit | None) -> None:
         redraw()
 
 
-def hovered() -> picking.Hit | None:
-    """What is marked under the mouse."""
-    return _state.hover
-
-
 def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
     """What to draw; None if the tool is not active or the mesh would have to be read first."""
     from ...nicmm_core import NicmmError
@@ -127,7 +121,7 @@ def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
         if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
             return None
         opened = picking.opened_now(context)
-    except (InputError, NicmmError):
+    except (InputError, NicmmError, ImportError):
         return None  # a click reports the error
     return _Drawn(opened, opened.lines(), "", radius_of(opened))
 
@@ -267,7 +261,7 @@ def _draw_points() -> None:
     if not marks:
         return
     positions = np.array([mark.position for mark in marks])
-    centres, visible = view.project(positions), _visible(view, positions)
+    centres, visible = view.project(positions), _visible(context.region, view, positions)
     scale = context.preferences.system.ui_scale
     outlines, colour_of = [], []
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
@@ -326,12 +320,15 @@ def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_M
     return marks
 
 
-def _visible(view: View, positions: np.ndarray) -> np.ndarray:
-    """Which points are visible; rays are cast only if the view or the points have changed."""
+def _visible(region: bpy.types.Region, view: View, positions: np.ndarray) -> np.ndarray:
+    """Which points are visible in a region; rays are cast only if the view or points changed."""
     key = view.perspective.tobytes(), view.xray, id(view.mesh), positions.tobytes()
-    if _state.visible_of != key:
-        _state.visible, _state.visible_of = view.visible(positions), key
-    return _state.visible
+    before = _state.visible.get(region.as_pointer())
+    if before is not None and before[0] == key:
+        return before[1]
+    visible = view.visible(positions)
+    _state.visible[region.as_pointer()] = key, visible
+    return visible
 
 
 class Colours:

@@ -22,7 +22,7 @@ from ..scene.lookup import by_uid, is_in
 from ..scene.messages import InputError
 from ..scene.surface import Surface
 from . import element_snap, mirror_snap
-from .view import View, view_of
+from .view import OFFSET, View, view_of
 
 if TYPE_CHECKING:
     from ...nicmm_core import SurfaceCurve, SurfacePoints
@@ -33,8 +33,8 @@ POINT_REACH, CURVE_REACH = 12.0, 8.0
 CURVE = "CURVE"
 """Name of another designed curve among the elements that points snap to."""
 
-SOLID = {"SOLID", "TEXTURED", "WIRE"}
-"""Display types in which an object can hide the surface, unlike one shown by its bounds only."""
+SOLID = {"SOLID", "TEXTURED"}
+"""Display types in which an object can hide the surface, unlike wires and bounds."""
 
 
 class Kind(Enum):
@@ -100,7 +100,7 @@ class _VisibleCurves:
         """Drop everything that was read."""
         self.key: tuple[object, ...] = ()
         self.opened: Opened | None = None
-        self.lines: list[Line] = []
+        self.lines: dict[int, list[Line]] = {}
         self.uses_key: tuple[int, ...] = ()
         self.uses: set[bool] = set()
 
@@ -212,7 +212,7 @@ def under_mouse_now(context: bpy.types.Context, pixel: np.ndarray) -> Hit | None
         if mesh_object is None or not is_ready(context, mesh_object, curve):
             return None
         return under_mouse(context, pixel)
-    except (InputError, NicmmError):
+    except (InputError, NicmmError, ImportError):
         return None  # a click reports the error
 
 
@@ -330,15 +330,17 @@ def _read(context: bpy.types.Context) -> tuple[Opened, list[Line]]:
         raise InputError(polls.NO_MESH_OR_CURVE)
     uid = 0 if curve is None else curve.session_uid
     panel = curve_record.settings_from(context.scene.nicmm_curves)
-    # Another viewport may be in local view and show other curves.
-    view = 0 if context.space_data is None else context.space_data.as_pointer()
-    key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode, view
-    opened = _visible_curves.opened
+    key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode
+    opened, lines = _visible_curves.opened, _visible_curves.lines
     if opened is None or key != _visible_curves.key:
         _visible_curves.opened = opened = edited_curve.open_curve(context, curve)
-        _visible_curves.lines = _other_lines(context, mesh_object, curve, opened.surface)
         _visible_curves.key = surface_cache.changes(), *key[1:]
-    return opened, _visible_curves.lines
+        lines.clear()
+    # Another viewport may be in local view and show other curves.
+    view = 0 if context.space_data is None else context.space_data.as_pointer()
+    if view not in lines:
+        lines[view] = _other_lines(context, mesh_object, curve, opened.surface)
+    return opened, lines[view]
 
 
 def _other_lines(
@@ -425,6 +427,8 @@ def _is_behind_another(
     origin = to_world @ Vector(near)
     step = to_world.to_3x3() @ Vector(direction)
     limit = float(np.dot(position - near, direction) / np.dot(direction, direction))
+    # What nearly coincides with the surface does not hide it.
+    limit -= OFFSET * view.surface.diagonal / float(np.linalg.norm(direction))
     graph = context.evaluated_depsgraph_get()
     for other in context.visible_objects:
         if other == mesh_object or other.type != "MESH" or other.display_type not in SOLID:

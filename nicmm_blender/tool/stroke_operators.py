@@ -20,7 +20,6 @@ from ..scene.control_points import ControlPoints
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import group_weights
 from ..scene.via_points import no_via_points
-from ..scene.viewports import NAVIGATION
 from ..settings import CURVE
 from . import picking
 from .changes_points import ChangesPoints
@@ -197,11 +196,14 @@ class NICMM_OT_feature_curve(_FollowsLine, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Look for the feature near the mouse, if the caller has not given a distance."""
+        return with_error_reports(self, lambda: self._invoke(context, event))
+
+    def _invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.properties.is_property_set("reach") and picking.is_view(context):
             opened = edited_curve.open_new(context)
             view = picking.view_on(context, opened.mesh_object, opened.surface)
             pixels = NEAR * context.preferences.system.ui_scale
-            place = np.array(self.properties["position"][:], dtype=np.float64)
+            place = np.array(self.properties.position[:], dtype=np.float64)
             self.reach = pixels * view.pixel_size(place) * opened.surface.scale
         return super().invoke(context, event)
 
@@ -292,9 +294,7 @@ class NICMM_OT_draw_stroke(bpy.types.Operator):
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._end(context)
             return with_error_reports(self, lambda: self._finish(context, event))
-        elif event.type in NAVIGATION:
-            return {"RUNNING_MODAL"}  # the pixels of the stroke belong to this view
-        return {"RUNNING_MODAL"}
+        return {"RUNNING_MODAL"}  # without navigation, since the pixels belong to this view
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Called by Blender when it ends the operator, for example when it quits."""

@@ -76,10 +76,10 @@ class _SurfaceCurve:
     ) -> None:
         """Draw the settings of the active curve, or of a new one, in the header."""
         curve = edited_curve.active(context)
-        tool = context.scene.nicmm_curves
-        layout.prop(tool, "tool_action", expand=True, icon_only=True)
-        if tool.tool_action == "FREEHAND":
-            layout.prop(tool, "stroke_tolerance")
+        properties = context.scene.nicmm_curves
+        layout.prop(properties, "tool_action", expand=True, icon_only=True)
+        if properties.tool_action == "FREEHAND":
+            layout.prop(properties, "stroke_tolerance")
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)
             layout.operator(NICMM_OT_next_course.bl_idname)
@@ -87,7 +87,6 @@ class _SurfaceCurve:
             choosing.operator_context = "INVOKE_REGION_WIN"  # the mouse is used in the viewport
             choosing.operator(NICMM_OT_choose_course.bl_idname)
             return
-        properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness", "normal_bending"):
             layout.prop(properties, name)
         draw_avoid_others(layout, properties, "Avoid Others")  # the header is narrow

@@ -88,24 +88,12 @@ class View:
 
     def surface_point_at(self, pixel: np.ndarray) -> SurfacePoints | None:
         """The visible point of the surface under a pixel, as a point of the core, or None."""
-        from ...nicmm_core.geometry.surface_points import first_hits
-
-        origin, direction = (
-            vector[None] @ self.surface.local_to_core.T for vector in self.ray(pixel)
-        )
-        while True:
-            points, along = first_hits(self.mesh, origin, direction)
-            face = int(points.faces[0])
-            if face < 0 or not self.surface.hidden[face]:
-                return None if face < 0 else points
-            # Continue behind the hidden face, by a step that exceeds rounding errors.
-            origin = origin + (along[0] + BEHIND) * direction
-            direction = direction * max(1.0 - along[0] - BEHIND, 0.0)
+        origin, direction = self.ray(pixel)
+        points, _ = self._first_hits(origin[None], direction[None])
+        return points if points.faces[0] >= 0 else None
 
     def visible(self, positions: np.ndarray) -> np.ndarray:
         """Which positions are in view and not hidden by the mesh, (n,)."""
-        from ...nicmm_core.geometry.surface_points import first_hits
-
         if not len(positions):
             return np.zeros(0, dtype=bool)
         pixels = self.project(positions)
@@ -115,8 +103,7 @@ class View:
         origins, _ = self.rays(np.where(seen[:, None], pixels, 0.0))
         directions = np.where(seen[:, None], positions, origins) - origins
         lengths = np.linalg.norm(directions, axis=1)
-        local_to_core = self.surface.local_to_core.T
-        _, along = first_hits(self.mesh, origins @ local_to_core, directions @ local_to_core)
+        _, along = self._first_hits(origins, directions)
         room = OFFSET * self.surface.diagonal / np.maximum(lengths, np.finfo(float).tiny)
         return seen & (along >= 1.0 - room)
 
@@ -184,6 +171,31 @@ class View:
             away[~(clear if clear.any() else inside)] = -1.0
             places[number] = pixels[away.argmax()]
         return places
+
+    def _first_hits(
+        self, origins: np.ndarray, directions: np.ndarray
+    ) -> tuple[SurfacePoints, np.ndarray]:
+        """Where rays in local space, (n, 3), first meet faces that are not hidden.
+
+        The distances along the rays are in lengths of their directions; infinite for a miss.
+        """
+        from ...nicmm_core.geometry.surface_points import first_hits, joined
+
+        origins, directions = (
+            each @ self.surface.local_to_core.T for each in (origins, directions)
+        )
+        points, along = first_hits(self.mesh, origins, directions)
+        hidden = self.surface.hidden
+        while len(again := np.flatnonzero((points.faces >= 0) & hidden[points.faces])):
+            # Continue behind the hidden face, by a step that exceeds rounding errors.
+            passed = along[again] + BEHIND
+            begins = origins[again] + passed[:, None] * directions[again]
+            further, beyond = first_hits(self.mesh, begins, directions[again])
+            along[again] = passed + beyond
+            index = np.arange(len(along))
+            index[again] = len(along) + np.arange(len(again))
+            points = joined([points, further])[index]
+        return points, along
 
     def _in_pixels(self, positions: np.ndarray, radius: float) -> np.ndarray:
         """Size in pixels, (n,), of a length parallel to the screen at each position."""

@@ -114,3 +114,18 @@ def test_points_snap_to_elements_of_polygons(extension, cube, elements, near, ex
         wanted = (near[0], -1.0, near[2]) if inverted else expected
         np.testing.assert_allclose(position, wanted, atol=2e-3 if inverted else 5e-3)
     tools.use_snap = False
+
+
+def test_a_damaged_record_has_a_message_in_the_panel(extension, equator):
+    key = scenes.module(extension, "scene.curve_record").RECORD_KEY
+    equator[key]["counts"] = [-3]
+    panel = scenes.module(extension, "interface.panels").NICMM_PT_measures
+    assert panel.poll(bpy.context)
+    assert scenes.module(extension, "operators.measures").now(equator).problem
+
+
+def test_a_hidden_curve_is_not_edited(extension, equator):
+    edited_curve = scenes.module(extension, "outputs.edited_curve")
+    assert edited_curve.active(bpy.context) is equator
+    equator.hide_set(True)
+    assert edited_curve.active(bpy.context) is None

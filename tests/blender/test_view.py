@@ -1,5 +1,7 @@
 """The view: maps pixels to points on the mesh and back, and finds what can be picked."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -103,3 +105,18 @@ def test_a_tube_over_the_horizon_is_picked_where_it_is_seen(empty_scene):
     assert view.nearest_on_line(over + [0, 30.0], line, 2.0, radius=0.1) is None
     # In the middle of the view the front of the sphere hides the tube.
     assert view.nearest_on_line(CENTRE, line * [1, 1, 0], 2.0, radius=0.1) is None
+
+
+def test_what_is_behind_hidden_faces_is_seen_and_picked(empty_scene):
+    opened = drawn(empty_scene, scenes.sphere(4))
+    surface = opened.surface
+    facing = surface.local_positions[surface.faces].mean(axis=1)[:, 1] < 0.0
+    view = looking(empty_scene, replace(opened, surface=replace(surface, hidden=facing)))
+    pixel = np.array([450.0, 330.0])
+    found = view.surface_point_at(pixel)
+    place = surface.points(found.faces, found.barycentric)
+    assert place[0, 1] > 0.0
+    assert view.visible(place).all() and view.nearest_point(pixel, place, 1.0) == 0
+    all_hidden = replace(surface, hidden=np.ones(len(facing), dtype=bool))
+    view = looking(empty_scene, replace(opened, surface=all_hidden))
+    assert view.surface_point_at(pixel) is None and view.visible(place).all()
