@@ -16,8 +16,8 @@ pytestmark = pytest.mark.usefixtures("one_attempt_each")
 
 @pytest.fixture(scope="module")
 def large():
-    """A body with limbs and 51,202 vertices."""
-    return shapes.creature(5, faces=400, subdivisions=4)
+    """A body with limbs and 12,802 vertices."""
+    return shapes.creature(5, faces=400, subdivisions=3)
 
 
 def chosen_on(mesh, count, seed=0):

@@ -63,7 +63,7 @@ def test_curves_with_normal_bending_stay_near_their_strokes(body):
 
     seeds = range(1, 6)
     assert max(away(seed, normal_bending=1.0) for seed in seeds) <= tolerance * 1.001
-    assert max(away(seed) for seed in seeds) > tolerance  # the points depend on the shape
+    assert any(away(seed) > tolerance for seed in seeds)  # the points depend on the shape
 
 
 @pytest.mark.slow
