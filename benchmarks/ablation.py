@@ -65,9 +65,6 @@ FEATURES = {
 PAPER_FEATURES = {ALL_FEATURES: 32.0, "w/o normals": 35.4, "w/o φ_p": 75.4, "w/o φ₀": 77.2}
 """Average iterations of Table 4."""
 
-HARDLY = 0.25
-"""Increase, relative to that of the paper, below which an effect contradicts that of the paper."""
-
 
 def measure(scale: Scale) -> Results:
     """Pretrain all variants alike on one mesh and fit them to other sets of that mesh."""
@@ -183,15 +180,6 @@ def _loss_ratio(runs: Mapping[str, Results], label: str) -> float:
     return float(np.mean(runs[label]["last_losses"]) / np.mean(runs[FULL]["last_losses"]))
 
 
-def _verdict(ratio: float, paper: float) -> str:
-    """Whether a ratio agrees with that of the paper, which is above 1."""
-    if ratio < 1.0:
-        return "lower, which contradicts the paper"
-    if ratio - 1.0 < HARDLY * (paper - 1.0):
-        return "hardly higher, which contradicts the paper in the size of the effect"
-    return "higher, which agrees with the paper"
-
-
 def _module_findings(runs: Mapping[str, Results]) -> str:
     """What the table of modules shows, in words, and whether it agrees with Table 3."""
     text = ""
@@ -201,7 +189,7 @@ def _module_findings(runs: Mapping[str, Results]) -> str:
         loss, paper = _loss_ratio(runs, label), PAPER_MODULES[label][1] / PAPER_MODULES[FULL][1]
         higher = np.greater(runs[label]["last_losses"], runs[FULL]["last_losses"])
         text += (
-            f"{label[0].upper()}{label[1:]}, the loss is {_verdict(loss, paper)} "
+            f"{label[0].upper()}{label[1:]}, the loss is {report.verdict(loss, paper)} "
             f"({loss:.2f} times that of the "
             f"full network; paper: {paper:.2f}; higher on {100 * higher.mean():.0f} % of the "
             "sets). "
@@ -285,7 +273,7 @@ def _feature_findings(stops: Mapping[str, Sequence[Results]]) -> str:
         )
         text += (
             f"{label[0].upper()}{label[1:]}, the number of iterations is "
-            f"{_verdict(ratio, paper)} ({ratio:.2f} times that with all "
+            f"{report.verdict(ratio, paper)} ({ratio:.2f} times that with all "
             f"features; paper: {paper:.2f}). "
         )
     losses = {label: float(np.mean([end["loss"] for end in ends])) for label, ends in stops.items()}

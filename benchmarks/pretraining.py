@@ -134,12 +134,12 @@ def _findings(results: Results) -> str:
     values = [share[label] for label in durations]
     most = max(one["epochs"] for one in trained.values()) * sets
     preparing = float(np.mean([one["preparing_seconds"] for one in trained.values()]))
+    paper = PAPER["2 min"] / PAPER[UNTRAINED]
     text = (
-        "In the paper, 2 minutes of pretraining reduce the loss to "
-        f"{PAPER['2 min'] / PAPER[UNTRAINED]:.2f} of that without pretraining. Here the ratio "
-        f"after the longest pretraining ({durations[-1]}) is {values[-1]:.2f}, "
+        f"After the longest pretraining ({durations[-1]}), the loss is "
+        f"{report.verdict(values[-1], paper)} ({values[-1]:.2f} of that without pretraining; "
+        f"paper, after 2 minutes: {paper:.2f}). "
     )
-    text += _verdict_on_gain(values[-1]) + " "
     if all(later <= earlier for earlier, later in zip(values, values[1:], strict=False)):
         text += "Longer pretraining always gives a lower loss, which agrees with the paper. "
     else:
@@ -156,11 +156,3 @@ def _findings(results: Results) -> str:
         f"repetitions, and the longest one here {most:,}, on one core."
     )
     return text
-
-
-def _verdict_on_gain(share: float) -> str:
-    if share >= 1.0:
-        return "which contradicts the paper: pretraining does not help here."
-    if share > 2.0 * PAPER["2 min"] / PAPER[UNTRAINED]:
-        return "so pretraining helps as in the paper, but far less."
-    return "which agrees with the paper: pretraining lowers the loss."

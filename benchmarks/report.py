@@ -102,6 +102,24 @@ def link_to(title: str) -> str:
     return f"[{title}](../benchmarks/RESULTS.md#{anchor})"
 
 
+HARDLY = 0.25
+"""Share of an effect in the paper below which an effect contradicts it in its size."""
+
+
+def verdict(ratio: float, paper: float, less: str = "lower", more: str = "higher") -> str:
+    """Whether a change has the effect that it has in the paper.
+
+    Both are ratios of values with and without the change, so 1 means no effect.
+    """
+    wanted, opposite = (less, more) if paper < 1.0 else (more, less)
+    effect = (ratio - 1.0) / (paper - 1.0)
+    if effect < 0.0:
+        return f"{opposite}, which contradicts the paper"
+    if effect < HARDLY:
+        return f"hardly {wanted}, which contradicts the paper in the size of the effect"
+    return f"{wanted}, which agrees with the paper"
+
+
 VERDICTS = {
     "agrees with the paper only": "agrees in part",
     "agrees with the paper": "agrees",

@@ -205,4 +205,5 @@ def _against_the_paper(slow: str, ratio: float) -> str:
     published = PAPER["nicmm"][0] / PAPER["variational"][0]
     if slow == "variational":
         return f", which contradicts the paper, where it is {published:.2f} times as fast"
-    return f", which agrees with the paper that it is slower ({published:.2f} times)"
+    slower = report.verdict(ratio, published, "faster", "slower")
+    return f", so it is {slower} ({published:.2f} times)"

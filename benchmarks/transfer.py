@@ -122,18 +122,12 @@ def _findings(runs: Mapping[str, Results]) -> str:
     """What the table shows, in words, and whether it agrees with the paper."""
     means = {label: float(np.mean(run["last_losses"])) for label, run in runs.items()}
     share = {label: mean / means[UNTRAINED] for label, mean in means.items()}
+    paper = PAPER[ONE_MESH] / PAPER[UNTRAINED]
     text = (
-        f"Pretraining on one mesh changes the loss on other meshes to {share[ONE_MESH]:.2f} of "
-        f"that without pretraining (paper: {PAPER[ONE_MESH] / PAPER[UNTRAINED]:.2f}), "
-    )
-    text += (
-        "which agrees with the paper: it lowers the loss. "
-        if share[ONE_MESH] < 1.0
-        else "which contradicts the paper: it does not lower the loss. "
-    )
-    text += (
-        "The shipped weights, which were pretrained for longer and on generated shapes, change it "
-        f"to {share[SHIPPED]:.2f}. "
+        "After pretraining on one mesh, the loss on other meshes is "
+        f"{report.verdict(share[ONE_MESH], paper)} ({share[ONE_MESH]:.2f} of that without "
+        f"pretraining; paper: {paper:.2f}). With the shipped weights, which were pretrained for "
+        f"longer and on generated shapes, it is {share[SHIPPED]:.2f} of that. "
     )
     if means[ONE_MESH] < means[SHIPPED]:
         worse = np.greater(runs[SHIPPED]["last_losses"], runs[ONE_MESH]["last_losses"]).mean()
