@@ -190,9 +190,8 @@ def _module_findings(runs: Mapping[str, Results]) -> str:
         higher = np.greater(runs[label]["last_losses"], runs[FULL]["last_losses"])
         text += (
             f"{label[0].upper()}{label[1:]}, the loss is {report.verdict(loss, paper)} "
-            f"({loss:.2f} times that of the "
-            f"full network; paper: {paper:.2f}; higher on {100 * higher.mean():.0f} % of the "
-            "sets). "
+            f"({loss:.2f} times that of the full network; paper: {paper:.2f}; higher on "
+            f"{100 * higher.mean():.0f} % of the sets). "
         )
     faster = all(_time_ratio(runs, label) < 1.0 for label in runs if label != FULL)
     text += (
@@ -273,8 +272,8 @@ def _feature_findings(stops: Mapping[str, Sequence[Results]]) -> str:
         )
         text += (
             f"{label[0].upper()}{label[1:]}, the number of iterations is "
-            f"{report.verdict(ratio, paper)} ({ratio:.2f} times that with all "
-            f"features; paper: {paper:.2f}). "
+            f"{report.verdict(ratio, paper)} ({ratio:.2f} times that with all features; paper: "
+            f"{paper:.2f}). "
         )
     losses = {label: float(np.mean([end["loss"] for end in ends])) for label, ends in stops.items()}
     if losses[ALL_FEATURES] == min(losses.values()):

@@ -79,8 +79,8 @@ class CourseSearch(LongSolves):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        has_mesh = curve_record.mesh_of_context(context) is not None
-        return polls.usable(cls, context, has_mesh, polls.NO_CURVE, polls.TOOL)
+        has_curve = edited_curve.active(context) is not None
+        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
     def use_courses(
         self, context: bpy.types.Context, opened: Opened, courses: list[Course]

@@ -11,9 +11,10 @@ together with its digest, so an update never triggers another one.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import bpy
@@ -39,10 +40,6 @@ PAUSE = 0.01
 
 WAIT = 0.1
 """Seconds until the next check whether work may begin or continue."""
-
-
-Surfaces = dict[tuple[bpy.types.Object, bool, bool], Surface]
-"""Surfaces by the mesh object, the use of modifiers, and whether the cage is traced."""
 
 
 @dataclass(frozen=True)
@@ -135,12 +132,12 @@ def _begin() -> None:
     """Start work on the outdated curves."""
     changed, everything = _updates.changed, _updates.everything
     _updates.changed, _updates.everything = set(), False
-    surfaces: Surfaces = {}
+    read_once = cache(read)  # several curves may lie on the same surface
     with _unnoticed():
         for designed in _live_curves():
             mesh_object = curve_record.mesh_of(designed)
             if mesh_object is not None and (everything or mesh_object.session_uid in changed):
-                _add_request(designed, mesh_object, surfaces)
+                _add_request(designed, mesh_object, read_once)
     if _updates.requests:
         requests = _updates.requests
         _updates.work = time_slices.Work(lambda progress: answer_all(requests, progress))
@@ -161,9 +158,9 @@ def _unnoticed() -> Iterator[None]:
 def _add_request(
     designed: bpy.types.Object,
     mesh_object: bpy.types.Object,
-    surfaces: Surfaces,
+    read_once: Callable[..., Surface],
 ) -> None:
-    """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
+    """Add a request for a curve if it is outdated; `read_once` is a cached `surface.read`."""
     from ... import nicmm_core as nicmm
 
     uid = designed.session_uid
@@ -172,7 +169,7 @@ def _add_request(
         settings = curve_record.settings_of(designed)
         if not curve_record.has_curve(designed):  # a drawing with too few points
             return
-        surface = _read_once(mesh_object, settings.use_modifiers, False, surfaces)
+        surface = read_once(mesh_object, settings.use_modifiers, traced=False)
         others = avoided_curves.above(designed, mesh_object, surface, settings)
         now = curve_record.digest(mesh_object, surface, settings, others)
         updated = {uid for uid, _ in _updates.curves}
@@ -183,23 +180,13 @@ def _add_request(
         if uid in _updates.failed and _updates.failed[uid].digest == now and not follows:
             return
         writing.check_replaceable(designed)
-        traced = _read_once(mesh_object, settings.use_modifiers, True, surfaces)
+        traced = read_once(mesh_object, settings.use_modifiers)
         request = design_request.for_curve(designed, mesh_object, traced, settings)
     except (InputError, nicmm.NicmmError) as error:
         _note_failure(designed, now, error)
         return
     _updates.requests.append(request)
     _updates.curves.append((uid, curve_record.digest_of(designed)))
-
-
-def _read_once(
-    mesh_object: bpy.types.Object, use_modifiers: bool, traced: bool, surfaces: Surfaces
-) -> Surface:
-    """A surface; with its cage traced, which takes longer, if `traced` is set."""
-    key = mesh_object, use_modifiers, traced
-    if key not in surfaces:
-        surfaces[key] = read(mesh_object, use_modifiers, traced)
-    return surfaces[key]
 
 
 def _write(work: time_slices.Work[list[Answer]]) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that designs the curves of a mesh again."""
 
+from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING
 
 import bpy
@@ -17,10 +19,6 @@ from .long_solves import LongSolves
 
 if TYPE_CHECKING:
     from ..scene.design_request import Answer
-
-
-Surfaces = dict[tuple[bpy.types.Object, bool], Surface]
-"""Surfaces by the mesh object and the use of modifiers."""
 
 
 class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
@@ -54,11 +52,11 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         if self.use_panel:
             chosen = curve_record.settings_from(context.scene.nicmm_curves)
         requests, self._names, self._failed = [], [], []
-        surfaces: Surfaces = {}
+        read_once = cache(read)  # several curves may lie on the same surface
         for designed in self._curves(context):
             try:
                 writing.check_replaceable(designed)
-                requests.append(_request_again(designed, chosen, surfaces))
+                requests.append(_request_again(designed, chosen, read_once))
                 self._names.append(designed.name)
             except InputError as error:
                 self._failed.append((designed.name, str(error)))
@@ -119,19 +117,17 @@ def named(name: str) -> bpy.types.Object:
 
 
 def _request_again(
-    designed: bpy.types.Object, chosen: CurveSettings | None, surfaces: Surfaces
+    designed: bpy.types.Object, chosen: CurveSettings | None, read_once: Callable[..., Surface]
 ) -> DesignRequest:
     """A request to design a curve again, with its recorded settings or with `chosen`.
 
-    `surfaces` has those read so far.
+    `read_once` is a cached `surface.read`.
     """
     mesh_object = curve_record.mesh_in_any_scene(designed)
     settings = curve_record.settings_of(designed) if chosen is None else chosen
-    key = mesh_object, settings.use_modifiers
-    if key not in surfaces:
-        mesh_data.synchronise(mesh_object)
-        surfaces[key] = read(mesh_object, settings.use_modifiers)
-    return design_request.for_curve(designed, mesh_object, surfaces[key], settings)
+    mesh_data.synchronise(mesh_object)
+    surface = read_once(mesh_object, settings.use_modifiers)
+    return design_request.for_curve(designed, mesh_object, surface, settings)
 
 
 def register() -> None:

@@ -139,7 +139,7 @@ def source_of(parallel: bpy.types.Object) -> bpy.types.Object:
 def computed(
     surface: Surface, curves: list[SurfaceCurve], settings: ParallelSettings
 ) -> list[SurfaceCurve]:
-    """The curves parallel to some curves; an error if there are none."""
+    """Compute curves parallel to given ones; an error if no place is so far away."""
     check_finite("parallel_distance", settings.parallel_distance)
     distances = _distances(settings.parallel_distance, settings.parallel_count, settings.both_sides)
     found = _parallels(surface, curves, distances)

@@ -48,6 +48,9 @@ PLANE_WIDTH = 1.0
 DASHES = 40
 """Number of dashes of a line with a problem, which can be told from others without its colour."""
 
+MOST_VIEWS = 8
+"""Number of views whose visible points are kept; a quad view has four."""
+
 DISC_SIDES = 20
 """Number of sides of the disc that shows a control point, and of the ring of a via point."""
 
@@ -81,7 +84,7 @@ class _State:
         self.dashed = False
         self.plane: gpu.types.GPUBatch | None = None
         self.plane_of: PlaneSection | None = None
-        self.visible: dict[int, tuple[tuple[object, ...], np.ndarray]] = {}
+        self.visible: dict[tuple[object, ...], np.ndarray] = {}
 
 
 _state = _State()
@@ -261,7 +264,7 @@ def _draw_points() -> None:
     if not marks:
         return
     positions = np.array([mark.position for mark in marks])
-    centres, visible = view.project(positions), _visible(context.region, view, positions)
+    centres, visible = view.project(positions), _visible(view, positions)
     scale = context.preferences.system.ui_scale
     outlines, colour_of = [], []
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
@@ -320,15 +323,14 @@ def _marks(opened: Opened, hit: picking.Hit | None, colours: Colours) -> list[_M
     return marks
 
 
-def _visible(region: bpy.types.Region, view: View, positions: np.ndarray) -> np.ndarray:
-    """Which points are visible in a region; rays are cast only if the view or points changed."""
+def _visible(view: View, positions: np.ndarray) -> np.ndarray:
+    """Which points are visible; rays are cast only if no viewport has shown them in this view."""
     key = view.perspective.tobytes(), view.xray, id(view.mesh), positions.tobytes()
-    before = _state.visible.get(region.as_pointer())
-    if before is not None and before[0] == key:
-        return before[1]
-    visible = view.visible(positions)
-    _state.visible[region.as_pointer()] = key, visible
-    return visible
+    if key not in _state.visible:
+        if len(_state.visible) == MOST_VIEWS:
+            del _state.visible[next(iter(_state.visible))]
+        _state.visible[key] = view.visible(positions)
+    return _state.visible[key]
 
 
 class Colours:

@@ -50,6 +50,7 @@ def test_the_cheapest_order_on_a_plane_has_the_gentlest_turns(closed):
 @pytest.mark.slow
 def test_the_fairest_curve_may_visit_points_in_another_order():
     """On some bodies it does; an order that is given is kept."""
+    changed = 0
     for seed in range(4):
         body = shapes.creature(seed, resolution=32, faces=1500)
         chosen = np.random.default_rng(seed).choice(len(body.vertices), 4, replace=False)
@@ -58,6 +59,5 @@ def test_the_fairest_curve_may_visit_points_in_another_order():
         visited = free.resumable.visited
         given = nicmm.design_curve(body, chosen)
         np.testing.assert_array_equal(given.resumable.visited, np.arange(4))
-        if tour(visited, True) != tour(np.arange(4), True):
-            return
-    pytest.fail("the order was the given one on every body")
+        changed += tour(visited, True) != tour(np.arange(4), True)
+    assert changed

@@ -507,7 +507,8 @@ def test_work_is_bounded_by_moves(flat_disc, work):
 
 
 @pytest.mark.slow
-def test_a_curve_on_a_mess_ends_within_its_work(monkeypatch):
+@pytest.mark.parametrize("number", [41, 197])
+def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
     """Repeated respacing costs more energy here than steps over folds gain."""
     work = []
     relax_once = surface_designer.relax
@@ -518,7 +519,7 @@ def test_a_curve_on_a_mess_ends_within_its_work(monkeypatch):
         return result
 
     monkeypatch.setattr(surface_designer, "relax", counted)
-    mess = messes.mess(197)
+    mess = messes.mess(number)
     nicmm.design_curve(mess.mesh, mess.points, **mess.arguments)
     # The last move may start just below the limit, and traverse some faces.
     assert 0.0 < max(work) <= DEFAULT.work + 10.0

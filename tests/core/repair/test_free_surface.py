@@ -41,7 +41,7 @@ def some_vertices(mesh, count, seed):
 def test_every_method_goes_round(method):
     ball = shapes.sphere(3)
     chosen = nearest_vertices(ball, [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
-    free = nicmm.design_curve(ball, chosen).curves[0]
+    free = nicmm.design_curve(ball, chosen, method=method).curves[0]
     weights = disc_on(ball, free, 0.25)
     assert length_inside(ball, free, weights) > 0.2
     design = nicmm.design_curve(ball, chosen, method=method, obstacles=weights)
