@@ -20,7 +20,7 @@ from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, corners_differ, edge_lengths
-from ..geometry.numbering import frame_coordinates, uniform_hash
+from ..geometry.numbering import principal_frame, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
@@ -151,10 +151,11 @@ def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> Coa
     areas = np.bincount(faces.ravel(), shares, len(mesh.vertices)).astype(np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
-    # Hashes of positions replace random numbers, so the result does not depend on the numbering.
-    chance = uniform_hash(frame_coordinates(mesh.vertices, faces, mesh.face_areas))
-    seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
-    # Lengths are changed slightly, so that no two paths on a grid are equally long.
+    frame = principal_frame(mesh.vertices, faces, mesh.face_areas)
+    seed = spread_vertices(mesh, frame, vertex_normals, areas, CANDIDATES * count, distance)
+    # Lengths are changed slightly, so that no two paths on a grid are equally long. Hashes of
+    # positions replace random numbers, so the result does not depend on the numbering.
+    chance = uniform_hash(frame.rounded_coordinates(mesh.vertices))
     lengths = edge_lengths(mesh.vertices, mesh.edges)
     lengths *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
     size = len(mesh.vertices)

@@ -26,6 +26,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.numbering import principal_frame
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import dot
@@ -129,13 +130,10 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
     vertex = np.flatnonzero(areas > 0.0)
     spacing = float(np.sqrt(areas.sum() / min(SEARCH_CELLS, len(vertex))))
     if len(vertex) > SEARCH_CELLS:
-        # The numbering depends only on the surface (`geometry.numbering`), so the sample does too.
-        chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
+        candidates, distance = CANDIDATES * SEARCH_CELLS, PACKING * spacing
+        frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
         normals = surface.vertex_normals
-        distance = PACKING * spacing
-        vertex = spread_vertices(
-            mesh, normals, areas, chance, CANDIDATES * SEARCH_CELLS, distance, NORMAL_WEIGHT
-        )
+        vertex = spread_vertices(mesh, frame, normals, areas, candidates, distance, NORMAL_WEIGHT)
     checkpoint()
     start, end, along = nicmm_kernels.nearest_cells(
         mesh.edge_graph, vertex, HOPS, REACH * spacing, checkpoint

@@ -79,6 +79,11 @@ class PrincipalFrame:
         """Coordinates of positions, (n, 3), along the axes, in units of the frame."""
         return (positions - self.centre) @ self.axes / self.unit
 
+    def rounded_coordinates(self, positions: FloatArray) -> IntArray:
+        """The same, rounded to the first of `RESOLUTIONS`, as integers, (n, 3)."""
+        with np.errstate(over="ignore"):  # vertices without faces may be anywhere
+            return rounded_to_integers(self.coordinates(positions) / RESOLUTIONS[0])
+
     def positions(self, coordinates: FloatArray) -> FloatArray:
         """Positions from coordinates, (n, 3)."""
         return self.unit * coordinates @ self.axes.T + self.centre
@@ -230,7 +235,7 @@ def _rounded_soundly(
     before = area_vectors(places, faces)
     greatest = SOUND * np.linalg.norm(before, axis=1)
     for resolution in RESOLUTIONS:
-        integers = _integers(places / resolution)
+        integers = rounded_to_integers(places / resolution)
         rounded = resolution * integers
         change = area_vectors(rounded, faces) - before
         if not exact and (np.linalg.norm(change, axis=1) <= greatest).all():
@@ -238,23 +243,8 @@ def _rounded_soundly(
     return places, integers
 
 
-def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> IntArray:
-    """Rounded coordinates in the principal frame of some faces, as integers, (V, 3).
-
-    Parameters
-    ----------
-    vertices : (V, 3) float array
-    faces : (F, 3) int array
-        The faces that determine the frame.
-    face_areas : (F,) float array
-    """
-    frame = principal_frame(vertices, faces, face_areas)
-    with np.errstate(over="ignore"):  # vertices without faces may be anywhere
-        return _integers(frame.coordinates(vertices) / RESOLUTIONS[0])
-
-
-def _integers(coordinates: FloatArray) -> IntArray:
-    """Coordinates rounded to integers."""
+def rounded_to_integers(coordinates: FloatArray) -> IntArray:
+    """Coordinates, of any shape, rounded to integers; those beyond a far bound are clipped."""
     return np.round(coordinates.clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
