@@ -2,8 +2,9 @@
 
 The farther a curve winds around limbs, the more courses a search misses. So the search is repeated,
 with other lengths and another tension, if the curve bends, and more often if even the best curve
-bends strongly. Then the parts that bend most are searched for again, and kinks are relaxed again
-with more tension and from the initial path. At last come courses for alternatives.
+bends strongly. Then the parts that bend most are searched for again. If the best curve has kinks,
+the initial path is tried before these searches, and more tension after them. At last come courses
+for alternatives.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
 from .request import Request
 from .start_search import (
-    MOST_FAILURES,
     InitialCurve,
     StartKind,
     StartSearch,
@@ -42,7 +42,7 @@ Curves above it may wind around limbs, where a search misses more courses.
 BENT = 15.0
 """L ∮ κ_g² ds above which the parts that bend most are searched for again."""
 
-STRONGLY_BENT = 30.0
+STRONGLY_BENT = 20.0
 """L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
 
 WITH_NORMAL_BENDING = 8.0
@@ -66,7 +66,7 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-SEARCHES_FOR_PARTS, OF_MANY_POINTS = 8, 2
+SEARCHES_FOR_PARTS, OF_MANY_POINTS = 6, 2
 """Greatest number of searches for parts of the best curve; and the same through so many control
 points that the spline is tried, where further ones gained nothing."""
 
@@ -87,16 +87,13 @@ MOST_WORK = 2_200
 In moves of all nodes. It takes about one second, and two to three on rough meshes.
 """
 
-RESERVED = 600
-"""Part of that work that must be left after a further search, for other attempts at kinks."""
-
 WORK_OF_SEARCH = 40
 """Approximate work of a search, in the same unit; as much again for each control or via point."""
 
 WORK_OF_PART = 100
 """Approximate work of a search for a part, in the same unit."""
 
-WORK_OF_TRANSFER = 40
+WORK_OF_TRANSFER = 20
 """Approximate work of transferring a course from the coarse mesh, in the same unit."""
 
 MAX_COURSES_RELAXED = 10
@@ -130,6 +127,8 @@ class Improvement:
         The start and the result of each attempt.
     searches, parts : int
         Numbers of searches for courses begun so far, of the whole curve and of parts.
+    path_tried : bool
+        Whether the initial path has been tried.
     repeat_found_same_curve, spline_found_same_curve : bool
         Whether the last repeated search, or the spline, has found the best curve of before once
         more.
@@ -143,6 +142,7 @@ class Improvement:
     relaxed: list[Relaxed] = field(default_factory=list)
     searches: int = 1
     parts: int = 0
+    path_tried: bool = False
     repeat_found_same_curve: bool = False
     spline_found_same_curve: bool = False
 
@@ -164,20 +164,13 @@ class Improvement:
             require, there are no searches. If no course was simple, further searches would hardly
             find one and take long, so they are made only for alternatives.
         """
-        request = self.request
-        further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
+        request, self.path_tried = self.request, start_kind is StartKind.PATH
+        further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
         if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
             self._search_further(courses, further, start_kind)
         if self._should_tighten():
             self.attempt(self.starts[self.best], self._limited(TIGHTENED))
-        if start_kind is not StartKind.PATH and self._should_try_path():
-            # On steps and creases, the initial path may be better than any course. It is only
-            # another candidate, so its errors do not matter.
-            start = None
-            with contextlib.suppress(NicmmError):
-                start = self.search.by_path(request)
-            if start is not None:
-                self.attempt(start, self._config)
+        self._try_path()
         if request.alternatives:
             others = itertools.chain(courses, *further[: max(self.searches - 1, 1)])
             new = (start for start in others if is_new(start, self.curves))
@@ -201,6 +194,7 @@ class Improvement:
                 self._try_spline()
             if by_course:
                 self._try_other_courses(courses)
+        self._try_path()
         if by_course:
             for repeated in further:
                 if not (self._should_search_again() and self._try_courses(repeated)):
@@ -219,6 +213,19 @@ class Improvement:
             before = len(self.starts)
             self.attempt(start, self._config)
             self.spline_found_same_curve = self._found_same_curve(before)
+
+    def _try_path(self) -> None:
+        """Try the initial path, once, if the best curve has kinks.
+
+        On steps and creases, it may be better than any course.
+        """
+        if self.path_tried or not self._should_try_path():
+            return
+        self.path_tried, start = True, None
+        with contextlib.suppress(NicmmError):  # it is only another candidate
+            start = self.search.by_path(self.request)
+        if start is not None:
+            self.attempt(start, self._config)
 
     def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.
@@ -338,18 +345,19 @@ class Improvement:
         least = self._bound(SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT)
         found_twice = self.repeat_found_same_curve or self.spline_found_same_curve
         promising = self._bending > least and not found_twice
-        return promising and self._is_affordable(self._work / self.searches + RESERVED)
+        return promising and self._is_affordable(self._work / self.searches + self._reserved)
 
     def _should_try_another_course(self, first: int) -> bool:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
         least = min(scaled_bending(each.discrete_curve) for each in self.relaxed[first:])
-        mean = self._work_of_relaxations / len(self.relaxed)
-        return least > self._bound(STRONGLY_BENT) and self._is_affordable(mean + RESERVED)
+        return least > self._bound(STRONGLY_BENT) and self._is_affordable(
+            self._mean_work + self._reserved
+        )
 
     def _should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
         promising = self._bending > self._bound(BENT) and not self.spline_found_same_curve
-        return promising and self._is_affordable(WORK_OF_PART)
+        return promising and self._is_affordable(WORK_OF_PART + self._reserved)
 
     def _should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
@@ -357,8 +365,7 @@ class Improvement:
 
     def _should_try_path(self) -> bool:
         """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
-        mean = self._work_of_relaxations / len(self.relaxed)
-        return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+        return self._is_kinked and self._is_affordable(self._work_of_path)
 
     def _bound(self, bending: float) -> float:
         """A bound of the bending, with regard to other options that make the curve bend."""
@@ -388,6 +395,22 @@ class Improvement:
         of_searches = self.searches * self._work_of_search + self.parts * WORK_OF_PART
         transferred = self.search.transferred - self.transferred_before
         return of_searches + transferred * WORK_OF_TRANSFER + self._work_of_relaxations
+
+    @property
+    def _reserved(self) -> float:
+        """Work that must be left for other attempts at kinks, if the best curve has any."""
+        if not self._is_kinked:
+            return 0.0
+        return self.relaxed[self.best].work + (0.0 if self.path_tried else self._work_of_path)
+
+    @property
+    def _work_of_path(self) -> float:
+        """Approximate work of an attempt by the initial path."""
+        return self._work_of_search + self._mean_work
+
+    @property
+    def _mean_work(self) -> float:
+        return self._work_of_relaxations / len(self.relaxed)
 
     @property
     def _work_of_relaxations(self) -> float:

@@ -17,7 +17,7 @@ from .coarsening.coarse_start import CoarseStarts
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import is_apart
 from .courses.course_search import PART, WHOLE, SearchSize
-from .courses.course_surface import CourseSurface
+from .courses.course_surface import Course, CourseSurface, joined_courses
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
@@ -25,7 +25,6 @@ from .mapped_surface import MappedSurface
 from .new_legs import Leg, request_for_leg, with_new_legs
 from .path.initial_path import find_initial_path, path_curve
 from .path.spline_path import spline_samples
-from .progress import checkpoint
 from .relaxation.close_points import GREATEST_TURN, has_short_legs, turns
 from .relaxation.curve_along import curve_along
 from .relaxation.curve_nodes import CurveSurface, nodes_at
@@ -34,7 +33,7 @@ from .relaxation.simple_curve import simple_curve
 from .request import Request
 
 MOST_FAILURES = 4
-"""Number of courses in a row that are not simple on the mesh after which a repeated search ends.
+"""Number of courses in a row that are not simple on the mesh after which a search ends.
 
 On rough meshes each of them takes long.
 """
@@ -143,20 +142,23 @@ class StartSearch:
         self,
         request: Request,
         seed: int = 0,
-        most_failures: int | None = None,
+        insist: bool = False,
         search_size: SearchSize = WHOLE,
     ) -> Iterator[InitialCurve]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
 
-        The search ends after `most_failures` courses in a row that are not simple.
+        The search ends after `MOST_FAILURES` courses in a row that are not simple. If it is to
+        insist, these count only after the first simple course.
         """
-        failures = 0
+        failures, found = 0, not insist
         for start in self._joined_courses(request, seed, search_size):
-            failures = failures + 1 if start is None else 0
             if start is not None:
+                failures, found = 0, True
                 yield start
-            elif failures == most_failures:
-                break
+            else:
+                failures += 1
+                if found and failures >= MOST_FAILURES:
+                    break
 
     def with_other_part(
         self, request: Request, start: InitialCurve, curve: DiscreteCurve, part: BentPart
@@ -167,7 +169,7 @@ class StartSearch:
         """
         known = [curve]
         part_request = request_for_part(request, curve, part)
-        for course in self.courses(part_request, most_failures=MOST_FAILURES, search_size=PART):
+        for course in self.courses(part_request, search_size=PART):
             assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
             if changed is not None and is_apart(start.surface, changed, known):
@@ -191,10 +193,7 @@ class StartSearch:
         """
         surface, new = self.surface.of(request), [i for i, leg in enumerate(legs) if leg.is_new]
         asked = [request_for_leg(surface, curve, legs, number, request) for number in new]
-        found = [
-            self.courses(of_leg, most_failures=MOST_FAILURES, search_size=PART)
-            for of_leg, _ in asked
-        ]
+        found = [self.courses(of_leg, search_size=PART) for of_leg, _ in asked]
         for courses in zip(*found, strict=False):
             own = {}
             for number, (_, passed), course in zip(new, asked, courses, strict=True):
@@ -242,8 +241,8 @@ class StartSearch:
                 self.transferred += 1
                 yield None if found is None else InitialCurve(*found, mapped, unit)
             return
-        for course in self._courses.courses(request, seed, search_size):
-            checkpoint()
+
+        def join(course: Course) -> InitialCurve | None:
             curve = simple_curve(
                 self.surface.without_maps,
                 course.places,
@@ -252,7 +251,9 @@ class StartSearch:
                 request.closed,
                 corners=request.are_corners(course.visited),
             )
-            yield None if curve is None else InitialCurve(curve, course.visited, mapped, unit)
+            return None if curve is None else InitialCurve(curve, course.visited, mapped, unit)
+
+        yield from joined_courses(self._courses.courses(request, seed, search_size), join)
 
     @cached_property
     def _courses(self) -> CourseSurface:

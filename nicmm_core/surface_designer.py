@@ -211,7 +211,7 @@ class SurfaceDesigner:
         """Distinct curves by ascending energy, and whether the search was cancelled."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
-            courses = search.courses(request)
+            courses = search.courses(request, insist=True)
             start, kind = search.first(request, courses)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)

@@ -10,14 +10,13 @@ from functools import cached_property, partial
 import numpy as np
 
 from ..courses.course_search import WHOLE, SearchSize
-from ..courses.course_surface import CourseSurface, edges_crossed
+from ..courses.course_surface import Course, CourseSurface, edges_crossed, joined_courses
 from ..errors import NicmmError
 from ..geometry.array_types import IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..mapped_surface import MappedSurface
-from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..relaxation.discrete_curve import DiscreteCurve, noded
 from ..request import Request, mapped_request
@@ -57,14 +56,19 @@ class CoarseStarts:
             on_coarse = _on_coarse(self._mesh, self._coarse, request)
             copy, surface = self._copy_under(on_coarse.points)
             on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
-            for course in surface.courses(on_copy, seed, search_size):
-                checkpoint()
-                places = copy.points_back(course.places)
-                nodes = noded(self._coarse_surface, places, course.control_nodes, request.closed)
-                nodes = nodes.with_corners(request.are_corners(course.visited))
-                controls = request.points[course.visited]
-                curve = nodes_on_fine_mesh(self._fine, self._coarse, nodes, controls)
-                yield None if curve is None else (curve, course.visited)
+            join = partial(self._on_fine, request, copy)
+            yield from joined_courses(surface.courses(on_copy, seed, search_size), join)
+
+    def _on_fine(
+        self, request: Request, copy: Renumbered, course: Course
+    ) -> tuple[DiscreteCurve, IntArray] | None:
+        """A course on the canonical copy of the coarse mesh as a curve on the fine mesh."""
+        places = copy.points_back(course.places)
+        nodes = noded(self._coarse_surface, places, course.control_nodes, request.closed)
+        nodes = nodes.with_corners(request.are_corners(course.visited))
+        controls = request.points[course.visited]
+        curve = nodes_on_fine_mesh(self._fine, self._coarse, nodes, controls)
+        return None if curve is None else (curve, course.visited)
 
     @cached_property
     def is_large(self) -> bool:

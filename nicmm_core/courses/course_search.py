@@ -114,13 +114,13 @@ def find_courses(
     any_order: bool,
     seed: int = 0,
     search_size: SearchSize = WHOLE,
-) -> Iterator[tuple[Nodes, IntArray]]:
+) -> Iterator[tuple[Nodes, IntArray, bool]]:
     """Yield relaxed courses through points, by ascending energy, simple ones first.
 
     Courses that cross themselves follow, since small loops can be removed on the original mesh.
 
     Each course is given by its nodes and, for every node, the index of its control point, or -1 if
-    it has none. It is yielded twice, the second time with twice as many nodes.
+    it has none. It is yielded twice, the second time with twice as many nodes and True.
 
     Parameters
     ----------
@@ -184,9 +184,8 @@ def find_courses(
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
     for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
         own, visited = _selected(nodes, visit, np.array([one]))
-        for _ in range(2):
-            yield own, visited
-            own, visited = _resampled(surface, own, visited, 2)
+        yield own, visited, False
+        yield *_resampled(surface, own, visited, 2), True
 
 
 def _with_recombined(

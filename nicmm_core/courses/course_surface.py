@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..geometry.surface_points import SurfacePoints, in_first_faces, joined
 from ..mapped_surface import MappedSurface
 from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
+from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request, mapped_request
 from .course_search import WHOLE, SearchSize, find_courses
@@ -50,11 +52,34 @@ class Course:
         Indices of the control points among the nodes.
     visited : (k,) int array
         Indices of the control points in the request, in the order visited.
+    is_finer : bool
+        Whether it is the course before it with twice as many nodes.
     """
 
     places: SurfacePoints
     control_nodes: IntArray
     visited: IntArray
+    is_finer: bool
+
+
+Joined = TypeVar("Joined")
+
+
+def joined_courses(
+    courses: Iterable[Course], join: Callable[[Course], Joined | None]
+) -> Iterator[Joined | None]:
+    """Join the nodes of courses on a mesh; None for each course that is not simple there.
+
+    A course with twice as many nodes is left out if it is simple with fewer ones.
+    """
+    is_simple = False
+    for course in courses:
+        checkpoint()
+        if course.is_finer and is_simple:
+            continue
+        curve = join(course)
+        is_simple = curve is not None
+        yield curve
 
 
 def edges_crossed(mesh: Mesh) -> float:
@@ -159,10 +184,10 @@ class CourseSurface:
             seed=seed,
             search_size=search_size,
         )
-        for nodes, visit in found:
+        for nodes, visit, is_finer in found:
             places = self._refined.in_parents(nodes.places)
             control = np.flatnonzero(visit >= 0)
-            yield Course(places, control, visited[visit[control]])
+            yield Course(places, control, visited[visit[control]], is_finer)
 
     @cached_property
     def _graph(self) -> HopGraph:

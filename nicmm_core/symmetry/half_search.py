@@ -76,7 +76,7 @@ def symmetric_by_halves(
     copy = renumbered(half.mesh, int(component[0]))
     search = StartSearch(copy.mesh)
     on_copy, controls = _half_request(surface.mesh, half, copy, search, points, request)
-    starts: Iterator[InitialCurve] = search.courses(on_copy)
+    starts: Iterator[InitialCurve] = search.courses(on_copy, insist=True)
     first = next(starts, None)
     if first is None:
         first = search.by_path(on_copy)

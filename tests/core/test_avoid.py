@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
+from nicmm_core import improvement, shapes
 from nicmm_core.commands import main
 from nicmm_core.geometry.distances import distance_to_segments
 from nicmm_core.geometry.surface_points import nearest_points
@@ -25,6 +25,9 @@ pytestmark = pytest.mark.usefixtures("one_attempt_each")
 CLEARANCE = 0.05
 LEAST, MOST = 1.0, 1.05
 """Bounds of the distance where a curve is pressed against another one, in clearances."""
+
+MOST_WORK = improvement.MOST_WORK
+"""Work of all attempts at a curve, before fixtures change it."""
 
 JUNCTION_REACH = 2.0
 """Distance from a junction within which no clearance is kept, in clearances."""
@@ -128,8 +131,9 @@ def test_distance_on_a_torus():
 
 
 @pytest.mark.slow
-def test_two_curves_on_a_torus_keep_their_distance_and_no_more():
+def test_two_curves_on_a_torus_keep_their_distance_and_no_more(monkeypatch):
     """The distance from the outer equator is that along a meridian, r |v|."""
+    monkeypatch.setattr(improvement, "MOST_WORK", MOST_WORK)  # the first course may have kinks
     mesh, tube = shapes.torus(around=128, across=64), 0.4
 
     def on_torus(degrees, across):
@@ -433,7 +437,7 @@ class TestCheckAvoids:
     @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.09), (0.1, 0.0), (0.02, 0.019)])
     def test_far_enough(self, plate, line, height, clearance):
         image = self.image(plate, height)
-        assert distance_in_plane(image.curves[0], line.curves[0]) == pytest.approx(height, rel=0.02)
+        assert distance_in_plane(image.curves[0], line.curves[0]) == pytest.approx(height, rel=0.03)
         nicmm.Designer(plate).check_avoids(image, [line], clearance)
 
     @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.11), (0.02, 0.021)])

@@ -117,9 +117,9 @@ def test_repeated_searches_are_bounded(monkeypatch):
     searched = []
     seek = start_search.StartSearch.courses
 
-    def counted(self, request, seed=0, *further):
+    def counted(self, request, seed=0, **named):
         searched.append(seed)  # runs when the generator is first advanced
-        yield from seek(self, request, seed, *further)
+        yield from seek(self, request, seed, **named)
 
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)

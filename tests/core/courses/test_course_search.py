@@ -68,7 +68,7 @@ def test_courses_pass_their_points(body, closed):
             find_courses(graph, surface, points, along, fixed, ~fixed, closed, 1.0, any_order)
         )
         assert found
-        for nodes, visit in found:
+        for nodes, visit, _ in found:
             order = visit[visit >= 0]
             passed = nodes.positions[visit >= 0]
             there = points.positions(body)[order]
@@ -96,7 +96,7 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     points = points_near(ball, on_circle)
     graph = build_hop_graph(surface)
     along, fixed = distances_along_edges(surface, points), np.ones(3, bool)
-    nodes, _ = next(find_courses(graph, surface, points, along, fixed, ~fixed, True, 1.0, False))
+    nodes, *_ = next(find_courses(graph, surface, points, along, fixed, ~fixed, True, 1.0, False))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
     energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
     assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
