@@ -14,7 +14,7 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.checker import judge
 
 from . import collections, report
-from .evidence import EVERY_METHOD, Results, are_installed
+from .evidence import EVERY_METHOD, Results, missing_packages
 from .measures import bending
 from .peer_systems import later_signed_heat, task_on
 from .samples import random_sets
@@ -93,7 +93,7 @@ def section(results: Results) -> str:
 
 def _beside_signed_heat(scale: Scale) -> Results | None:
     """Times of dragged curves and of later solves of potpourri3d's signed heat on one mesh."""
-    if not are_installed(["potpourri3d"], scale):
+    if missing_packages(["potpourri3d"], scale):
         return None
     faces, subdivisions = (200, 1) if scale is Scale.SMOKE else PEER_BODY
     mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)

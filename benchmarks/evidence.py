@@ -46,8 +46,8 @@ EVERY_METHOD = (*DESIGN, "paper")
 """Folders of the core that a measurement may name as its `ROOMS`; those of the methods of the
 paper, of the default method, and of both."""
 
-PRESENTATION = ("documents", "evidence", "plots", "progress", "report", "scale")
-"""Modules of this package that only keep or present results."""
+PRESENTATION = ("__main__", "documents", "evidence", "plots", "progress", "report", "scale")
+"""Modules of this package that only run measurements and keep or present their results."""
 
 SOURCES = (".py", ".c", ".h", ".npz")
 """Endings of the files that count."""
@@ -125,12 +125,12 @@ def machine() -> str:
     )
 
 
-def are_installed(packages: Iterable[str], scale: Scale) -> bool:
-    """Whether packages are installed; if not, a full run ends with a message."""
+def missing_packages(packages: Iterable[str], scale: Scale) -> list[str]:
+    """Those of some packages that are not installed; a full run ends with a message then."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing and scale is Scale.FULL:
         raise SystemExit(f"Packages are missing. Run: .venv/bin/pip install {' '.join(missing)}")
-    return not missing
+    return missing
 
 
 def code_behind(name: str) -> str:

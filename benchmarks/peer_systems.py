@@ -9,7 +9,6 @@ not installed are left out.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import multiprocessing
 import time
 from collections.abc import Callable
@@ -111,13 +110,10 @@ SYSTEMS: dict[str, tuple[str, Callable[[Task], Answer]]] = {
 }
 """Package and function of each system, by name."""
 
+PACKAGES = tuple(dict.fromkeys(package for package, _ in SYSTEMS.values()))
+"""All of these packages."""
+
 LATER = "potpourri3d, signed heat, later"
-
-
-def missing_packages() -> list[str]:
-    """Packages of the systems that are not installed."""
-    packages = dict.fromkeys(package for package, _ in SYSTEMS.values())
-    return [package for package in packages if importlib.util.find_spec(package) is None]
 
 
 class SystemsProcess:

@@ -13,11 +13,11 @@ from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, renders, report
-from .evidence import EVERY_METHOD, Results, are_installed
+from .evidence import EVERY_METHOD, Results, missing_packages
 from .measures import bending
 from .methods import METHODS
 from .peer_sizes import measured_sizes, sizes_section
-from .peer_systems import SYSTEMS, Answer, SystemsProcess, Task, missing_packages, task_on
+from .peer_systems import PACKAGES, SYSTEMS, Answer, SystemsProcess, Task, task_on
 from .polylines import NearestPoints, misses
 from .samples import random_sets
 from .scale import Scale
@@ -50,8 +50,7 @@ ONE_CURVE = "one curve"
 
 def measure(scale: Scale) -> Results:
     """Compute a curve through the same points in the same order with every system."""
-    missing = missing_packages()
-    are_installed(missing, scale)
+    missing = missing_packages(PACKAGES, scale)
     systems = [name for name, (package, _) in SYSTEMS.items() if package not in missing]
     sets: list[Results] = []
     pictures: list[renders.Picture] = []

@@ -20,7 +20,10 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 
-from .curve_pairs import SNAP
+SNAP = 1e-3
+"""Distance, in edges, up to which cuts move to vertices.
+
+On thinner triangles, libigl needs far too much memory. The bounds of the distance regard it."""
 
 FINE = 0.5
 """Length of edges, in clearances, that are not halved any more."""
@@ -52,8 +55,9 @@ def proven_apart(
     """
     cut = nicmm.cut_mesh(mesh, list(curves), snap=SNAP)
     positions, faces, chains = cut.vertices, cut.faces, cut.chain_edges
+    moved = SNAP * _longest_edge(mesh.vertices, mesh.faces)
     while True:
-        distance = _distance_bounds(positions, faces, chains, clearance)
+        distance = _distance_bounds(positions, faces, chains, clearance) + moved
         if (distance[vertices] < clearance).any():
             return True
         if _are_apart(positions, faces, chains, distance, clearance, vertices):
