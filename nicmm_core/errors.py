@@ -54,4 +54,4 @@ class CurveError(NicmmError):
 
 
 class MissingPackageError(NicmmError):
-    """Pretraining needs a package that is not installed."""
+    """Plots, pretraining or a batch of designs needs a package that is not installed."""
