@@ -88,7 +88,9 @@ def main() -> int:
     scale = Scale.QUICK if options.quick else Scale.SMOKE if options.smoke else Scale.FULL
     if options.name == "stale":
         stale = [name for name in MEASUREMENTS if not evidence.is_current(name)]
-        print("\n".join([*stale, f"{len(stale)} of {len(MEASUREMENTS)} measurements are stale"]))
+        if stale:
+            count = f"{len(stale)} of {len(MEASUREMENTS)} measurements are stale"
+            print("\n".join([*stale, count]))
         return int(bool(stale))
     if options.name == "write":
         write()
