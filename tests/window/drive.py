@@ -647,7 +647,7 @@ def symmetry(blender: Blender) -> None:
     undo_and_redo(blender, states, "of a symmetric curve")
 
     step("Where the curve crosses the plane, the mark and the point snap to it")
-    blender.do("helper.look(0.15, -1.0, -0.6)")  # the chin from below
+    blender.do("helper.look(0.15, -0.7, -1.0)")  # the chin from below
     on_plane = "min(helper.line(), key=lambda place: (place[2] > 0.0, abs(place[0])))"
     (chin,) = blender.do(f"value = helper.pixels([{on_plane}])")
     beside = chin[0] + 4, chin[1]
