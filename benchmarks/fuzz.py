@@ -92,12 +92,14 @@ def section(results: Results) -> str:
 
 def summary(results: Results) -> str:
     """What the documents say of it."""
-    slow = sum(re.search(r": took \d+ s$", finding) is not None for finding in results["findings"])
-    others = report.none_or(len(results["findings"]) - slow, be="")
+    is_slow = [re.search(r": took \d+ s$", each) is not None for each in results["findings"]]
+    number_of = [each.split()[0] for each in results["findings"]]
+    others = {number for number, slow in zip(number_of, is_slow, strict=True) if not slow}
+    slow = sum(is_slow)
     text = (
-        f"`python -m benchmarks fuzz`, hostile input: of {results['cases']:,} cases {others} ended "
-        "with a crash, a hang, several curves "
-        "or an error of another package."
+        f"`python -m benchmarks fuzz`, hostile input: of {results['cases']:,} cases "
+        f"{report.none_or(len(others), be='')} ended with a crash, a hang, a faulty curve, printed "
+        "output or an error of another package."
     )
     if slow:
         text += (

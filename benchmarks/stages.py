@@ -158,7 +158,8 @@ def summary(results: Results) -> str:
     return report.item(
         f"On a mesh of {body['faces'] / 1e6:.1f} million faces the first curve takes {first:.1f} "
         f"seconds, a further curve {another:.1f} seconds, and an update while a point is dragged "
-        f"{dragged:.2f} seconds ([by stage](../benchmarks/RESULTS.md#where-the-time-goes))."
+        f"{1000.0 * dragged:.1f} milliseconds "
+        "([by stage](../benchmarks/RESULTS.md#where-the-time-goes))."
     )
 
 
