@@ -429,15 +429,21 @@ class TestCheckAvoids:
 
     MIRROR = ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
+    @pytest.fixture
+    def line(self, plate):
+        """The same line, which a third point keeps straighter than relaxation does."""
+        points = flat((-0.5, 0.0), (0.0, 0.0), (0.5, 0.0))
+        return nicmm.design_curve(plate, points, closed=False)
+
     def image(self, plate, height, start=-0.3):
-        points = flat((start, -height), (0.3, -height))
+        points = flat((start, -height), (0.5 * (start + 0.3), -height), (0.3, -height))
         return nicmm.mirrored(plate, nicmm.design_curve(plate, points, closed=False), self.MIRROR)
 
     @pytest.mark.slow
     @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.09), (0.1, 0.0), (0.02, 0.019)])
     def test_far_enough(self, plate, line, height, clearance):
         image = self.image(plate, height)
-        assert distance_in_plane(image.curves[0], line.curves[0]) == pytest.approx(height, rel=0.03)
+        assert distance_in_plane(image.curves[0], line.curves[0]) == pytest.approx(height, rel=0.02)
         nicmm.Designer(plate).check_avoids(image, [line], clearance)
 
     @pytest.mark.parametrize(("height", "clearance"), [(0.1, 0.11), (0.02, 0.021)])
