@@ -65,6 +65,7 @@ from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
 from .repaired_surface import (
     Manifold,
+    NotOnOriginalError,
     RepairedSurface,
     SurfaceOffCurves,
     curve_of_design,
@@ -197,22 +198,41 @@ class Designer:
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
                 request = self._request(control_points, options)
-                manifold, there = self._on_manifold(request)
-                if isinstance(start, Design) and _answers(start, manifold, there):
-                    return replace(start, seconds=time.perf_counter() - started)
-                begin = None if start is None else start_on(manifold, start)
-                with placed(manifold.in_original):
-                    found = manifold.designer.design(there, started, begin, max_iterations)
-                    design = manifold.design_on_original(found, request)
-                    if request.avoid is not None:
-                        avoided = avoided_curves(self.mesh, request.avoid, request.points)
-                        clearance = request.clearance
-                        design = _off_avoided(self.mesh, design, avoided, clearance)
-                        if isinstance(start, Design) and max_iterations is None:
-                            _check_even(start, design)
-                    return design
+                design = self._designed(request, started, start, max_iterations)
+                if request.avoid is not None:
+                    avoided = avoided_curves(self.mesh, request.avoid, request.points)
+                    design = _off_avoided(self.mesh, design, avoided, request.clearance)
+                    if isinstance(start, Design) and max_iterations is None:
+                        _check_even(start, design)
+                return design
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
+
+    def _designed(
+        self,
+        request: Request,
+        started: float,
+        start: Design | SurfaceCurve | None,
+        max_iterations: int | None,
+    ) -> Design:
+        """The design on the first manifold whose curve can be mapped back to the given mesh.
+
+        Faces that cleaning removes may be so wide, compared with the rest, that no curve leads
+        across them; a manifold that is cleaned less has them.
+        """
+        failure: NotOnOriginalError | None = None
+        for manifold, there in self._manifolds(request):
+            if isinstance(start, Design) and _answers(start, manifold, there):
+                return replace(start, seconds=time.perf_counter() - started)
+            begin = None if start is None else start_on(manifold, start)
+            with placed(manifold.in_original):
+                found = manifold.designer.design(there, started, begin, max_iterations)
+                try:
+                    return manifold.design_on_original(found, request)
+                except NotOnOriginalError as error:
+                    failure = failure or error
+        assert failure is not None  # there is at least one manifold
+        raise failure
 
     def mirrored(self, design: Design, plane: ArrayLike) -> Design:
         """The mirror image of a design; see the function `mirrored`."""
@@ -241,7 +261,7 @@ class Designer:
                 unpainted["corners"] = np.flatnonzero(corners)
                 unpainted["normal_bending"] = before.request.normal_bending
             request = Request(points=snapped(images[curve.control_index]), **unpainted)
-            manifold, there = self._on_manifold(request)
+            manifold, there = next(self._manifolds(request))
             found = mirrored_design(
                 manifold.designer.surface,
                 there,
@@ -388,7 +408,7 @@ class Designer:
         def curve_through(points: SurfacePoints, line: Line | None) -> SurfaceCurve | None:
             nonlocal left
             request = self._request(points, checked_options(self.mesh, options))
-            manifold, there = self._on_manifold(request)
+            manifold, there = next(self._manifolds(request))
             begin = None
             if line is not None:
                 positions = manifold.from_original(line.positions)
@@ -492,13 +512,22 @@ class Designer:
         """The surface of all faces."""
         return RepairedSurface(clean_surfaces(self.mesh), np.arange(len(self.mesh.faces)))
 
-    def _on_manifold(self, request: Request) -> tuple[Manifold, Request]:
-        """The first manifold that connects the points, and the request on it."""
+    def _manifolds(self, request: Request) -> Iterator[tuple[Manifold, Request]]:
+        """Yield the manifolds that connect the points, and the request on each.
+
+        Raises
+        ------
+        UnreachableError
+            If there is none.
+        """
         surface = self._surface_off_obstacles(request)
         kept_off = None if request.avoid is None else self._surface_off_curves(surface, request)
-        found = surface.find(request) if kept_off is None else kept_off.find(request)
-        if found is not None:
-            return found
+        found = surface.connecting(request) if kept_off is None else kept_off.connecting(request)
+        first = next(found, None)
+        if first is not None:
+            yield first
+            yield from found
+            return
         if kept_off is not None:
             kept_off.check_reachable(request)
         check_connected(self.mesh, request.points)
@@ -506,7 +535,7 @@ class Designer:
             with_via_points(
                 self.mesh, request.points, request.via_points, request.order, request.closed
             )
-        if surface is not self._whole and self._whole.find(request) is not None:
+        if surface is not self._whole and any(self._whole.connecting(request)):
             check_reachable(surface.most_connected, request.named_points)
         raise UnreachableError(PARTS)
 

@@ -13,6 +13,7 @@ nor the position or size of the mesh affects the curve.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -23,10 +24,16 @@ import numpy as np
 from .avoidance.avoided_curve import Avoided
 from .avoidance.off_curves import check_off_curves, surface_off_curves
 from .design_result import Design
-from .errors import CurveError
+from .errors import CurveError, UnreachableError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, lies_on, weights_in_faces
+from .geometry.curve import (
+    SurfaceCurve,
+    checked_curve,
+    curve_on_mesh,
+    lies_on,
+    weights_in_faces,
+)
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, coincide, joined
@@ -49,6 +56,10 @@ A canonical copy of it would take a large part of the time of a curve.
 Copies = tuple[MappedMesh | Renumbered, ...]
 """Copies of meshes, each made from the one before, with the maps `points_to`, `weights_to` and
 `curve_to` to it, and `curve_back` and `field_back` from it."""
+
+
+class NotOnOriginalError(UnreachableError):
+    """A curve is simple on a repaired mesh, but there is no such curve on the given one."""
 
 
 @dataclass(frozen=True)
@@ -152,24 +163,44 @@ class Manifold:
     def design_on_original(self, design: Design, request: Request) -> Design:
         """Map a design to the given mesh, on which it is requested.
 
-        It continues only on a mesh that equals the given one.
+        It continues only on a mesh that equals the given one. Alternatives that cannot be mapped
+        are left out.
+
+        Raises
+        ------
+        NotOnOriginalError
+            If the curve is not simple on the given mesh, since it crosses removed faces.
         """
         curves, resumable = design.curves, design.resumable
         for copy in self.copies[::-1]:
             curves = [copy.curve_back(curve) for curve in curves]
         if self.repaired.differs:
-            removed = self.repaired.clean.removed_faces
-            curves = [removed.led_across(curve, request.points) for curve in curves]
+            curves = [self._across_removed_faces(curve, request) for curve in curves]
+        alternatives = []
+        for other in design.alternatives:
+            with contextlib.suppress(NotOnOriginalError):
+                alternatives.append(self.design_on_original(other, request))
         mirror = request.mirror
         return replace(
             design,
             curves=curves,
-            alternatives=[self.design_on_original(other, request) for other in design.alternatives],
+            alternatives=alternatives,
             asymmetry=None if mirror is None else asymmetry(curves[0], mirror.plane),
             find_field=partial(_field_back, self.copies, design),
             resumable=resumable and replace(resumable, given=self.repaired.original),
             repairs=dict(self.repaired.repairs),
         )
+
+    def _across_removed_faces(self, curve: SurfaceCurve, request: Request) -> SurfaceCurve:
+        """A curve mapped back to the given mesh, led across the faces that were removed from it."""
+        removed = self.repaired.clean.removed_faces
+        led = removed.led_across(curve, request.points)
+        if not removed.is_simple(led):
+            raise NotOnOriginalError(
+                "no simple curve was found across the faces without area; remove these faces, and "
+                "merge vertices by distance"
+            )
+        return led
 
 
 def _field_back(copies: Copies, design: Design) -> FloatArray:
@@ -230,11 +261,8 @@ class RepairedSurface:
         """The manifold with the fewest components."""
         return min(self.manifolds(), key=lambda made: int(made.mesh.face_component.max()))
 
-    def find(self, request: Request) -> tuple[Manifold, Request] | None:
-        """Find a manifold on which the points of a request are connected.
-
-        Returns the manifold and the request mapped to it, or None if the points are connected on no
-        manifold.
+    def connecting(self, request: Request) -> Iterator[tuple[Manifold, Request]]:
+        """Yield the manifolds on which the points of a request are connected, with the request.
 
         Raises
         ------
@@ -249,8 +277,7 @@ class RepairedSurface:
             found = self._on_component(mapped, component)
             there = _request_on(found, request)
             if there is not None:
-                return found, there
-        return None
+                yield found, there
 
 
 class SurfaceOffCurves:
@@ -277,8 +304,8 @@ class SurfaceOffCurves:
             and all(map(Avoided.equals, self.avoided, avoided))
         )
 
-    def find(self, request: Request) -> tuple[Manifold, Request] | None:
-        """Find a manifold on which the points of a request are connected, as `RepairedSurface`."""
+    def connecting(self, request: Request) -> Iterator[tuple[Manifold, Request]]:
+        """Yield the manifolds on which the points of a request are connected, with the request."""
         points = joined([request.points, *request.via_points.values()])
         for mapped in self.surface.manifolds():
             component = mapped.common_component(points)
@@ -292,8 +319,7 @@ class SurfaceOffCurves:
             found = self._on_component(mapped, component, off, part)
             there = _request_on(found, request)
             if there is not None:
-                return found, there
-        return None
+                yield found, there
 
     def check_reachable(self, request: Request) -> None:
         """Raise an error if points of a request lie too close to the curves, or are separated.

@@ -32,6 +32,7 @@ def read_ply(path: Path) -> Polygons:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # about empty lists in text files
+            warnings.simplefilter("ignore", DeprecationWarning)  # about fractions as indices
             elements = _elements(path)
         vertices = np.stack([elements["vertex"][axis] for axis in "xyz"], axis=1)
         strips = "tristrips" in elements

@@ -16,7 +16,8 @@ from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, with_points
+from ..geometry.crossings import meeting_segments
+from ..geometry.curve import SurfaceCurve, points_of, with_points
 from ..geometry.grouping import shortest_chain
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import (
@@ -81,6 +82,53 @@ class RemovedFaces:
         passed = number[curve.control_index[curve.control_index >= 0]]
         polyline, left = without_backtracking(self._mesh, polyline, passed, curve.closed)
         return with_points(self._mesh, curve, polyline, left[number])
+
+    def is_simple(self, curve: SurfaceCurve) -> bool:
+        """Whether a curve, led across, lies on the given mesh and does not meet itself.
+
+        Vertices that were joined count as one. Where faces share no vertices, as at a T-junction,
+        both ends of a segment lie on one face up to `tolerances.GAP`.
+        """
+        points = points_of(curve)
+        one = np.arange(len(points) if curve.closed else len(points) - 1)
+        other = (one + 1) % len(points)
+        start, end = points[one], points[other]
+        faces = np.where(self._hold(start.faces, end), start.faces, end.faces)
+        apart = ~(self._hold(faces, start) & self._hold(faces, end))
+        corners = self._faces[faces]
+        weights = np.stack(
+            [weights_at(self._faces[at.faces], at.barycentric, corners) for at in (start, end)]
+        )
+        for segment in np.flatnonzero(apart).tolist():
+            found = self._near_both(points[np.array([one[segment], other[segment]])])
+            if not len(found):
+                return False
+            faces[segment], weights[:, segment] = found.faces[0], found.barycentric
+        meeting = meeting_segments(faces, *weights[:, :, :2])
+        steps = np.abs(meeting[:, 0] - meeting[:, 1])
+        neighbours = (steps == 1) | (curve.closed & (steps == len(one) - 1))
+        return bool(neighbours.all()) and not self._passes_twice(points)
+
+    def _near_both(self, ends: SurfacePoints) -> SurfacePoints:
+        """The ends of a segment in one face on which both lie; empty if there is none."""
+        positions = ends.positions(self._mesh)
+        most = max(tolerances.GAP * self._mesh.diagonal, tolerances.rounding(positions))
+        used = self._faces[ends.faces][ends.barycentric > 0.0]
+        with_all = (self._faces[:, :, None] == used).any(axis=1).all(axis=1)
+        for face in [*np.flatnonzero(with_all).tolist(), *ends.faces.tolist()]:
+            nearest, away = nearest_points(self._mesh, positions, np.array([face]))
+            if (away <= most).all():
+                return nearest
+        return ends[:0]
+
+    def _passes_twice(self, points: SurfacePoints) -> bool:
+        """Whether two points are the same vertex, or the same place on one edge."""
+        on_side = (points.barycentric == 0.0).any(axis=1)
+        weights = points.barycentric[on_side]
+        vertices = np.where(weights > 0.0, self._faces[points.faces[on_side]], -1)
+        order = np.argsort(vertices, axis=1)
+        key = [np.take_along_axis(each, order, axis=1) for each in (vertices, weights)]
+        return len(np.unique(np.concatenate(key, axis=1), axis=0)) < len(weights)
 
     def _with_exact_controls(self, curve: SurfaceCurve, given: SurfacePoints) -> SurfacePoints:
         """The points of a curve, with exact control points where vertices were moved together."""

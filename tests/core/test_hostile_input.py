@@ -97,9 +97,9 @@ def test_a_seeded_part_of_the_fuzzing(part, request):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1746, 5864, 7294, 8976])
+@pytest.mark.parametrize("number", [1746, 3496, 5864, 6448, 6921, 7180, 7294, 8976])
 def test_what_a_whole_run_has_found(number):
-    """No nearest point; overflowing derivatives; infinite coordinates; steps of length zero."""
+    """Cases in which the answer was a faulty curve, an error without a type, or a warning."""
     with warnings.catch_warnings(record=True) as printed:
         assert hostile_input.answer(number).faults == []
     assert not printed
