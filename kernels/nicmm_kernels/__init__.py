@@ -45,6 +45,7 @@ from .steps import (
 from .traced_places import TraceArrays, places_on_traces, segment_ends
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
 from .turning_paths import turning_paths
+from .uncrossing import UncrossingRules, remove_crossings, reordered
 
 __all__ = [
     "BatchRules",
@@ -74,6 +75,7 @@ __all__ = [
     "TraceArrays",
     "TooManyWindowsError",
     "TraceLimits",
+    "UncrossingRules",
     "best_legs",
     "cell_sets",
     "conormal_derivatives",
@@ -94,6 +96,8 @@ __all__ = [
     "polyline_crossings",
     "refine_at_level",
     "relax_curves",
+    "remove_crossings",
+    "reordered",
     "segment_ends",
     "trace_between",
     "trace_from",

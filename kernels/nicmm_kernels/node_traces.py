@@ -32,7 +32,9 @@ STEPS_OF_A_THREAD = 1_000
 """Least number of steps for which another thread is worthwhile."""
 
 
-class _NodePlaces(ctypes.Structure):
+class NodePlaces(ctypes.Structure):
+    """Nodes, and limits of the traces between them, as the library reads them."""
+
     _fields_ = [
         ("faces", POINTER),
         ("barycentric", POINTER),
@@ -88,17 +90,18 @@ Places = tuple[IntArray, FloatArray]
 """Faces of points, (n,), and barycentric coordinates in them, (n, 3)."""
 
 _TRACE_STEPS = Kernel(
-    "trace_steps", SurfacePointers, _NodePlaces, NodePointers, COUNT, _StepTraces, PointList,
+    "trace_steps", SurfacePointers, NodePlaces, NodePointers, COUNT, _StepTraces, PointList,
     COUNT, ctypes.POINTER(COUNT),
 )  # fmt: skip
 _TRACE_POLYLINE = Kernel(
-    "trace_polyline", SurfacePointers, _NodePlaces, NodePointers, _TracedPolyline, PointList,
+    "trace_polyline", SurfacePointers, NodePlaces, NodePointers, _TracedPolyline, PointList,
     COUNT, ctypes.POINTER(COUNT),
 )  # fmt: skip
 
 
-def _places(places: Places, n: int, limits: StepLimits) -> _NodePlaces:
-    return _NodePlaces(
+def node_places(places: Places, n: int, limits: StepLimits) -> NodePlaces:
+    """The places of n nodes, with limits of traces."""
+    return NodePlaces(
         address("faces", places[0], INT, n), address("barycentric", places[1], FLOAT, n, 3),
         *limits,
     )  # fmt: skip
@@ -140,7 +143,7 @@ def trace_steps(
     m = rows("start", start)
     address("start", start, INT, m)
     address("end", end, INT, m)
-    placed = _places(places, nodes.count, limits)
+    placed = node_places(places, nodes.count, limits)
 
     def trace(
         part: slice, meanwhile: Callable[[], object]
@@ -214,7 +217,7 @@ def trace_polyline(
         address("former barycentric", former[1], FLOAT, p, 3), 0, node_index.ctypes.data,
         lost.ctypes.data,
     )  # fmt: skip
-    placed, pointers = _places(places, n, limits), nodes.one()
+    placed, pointers = node_places(places, n, limits), nodes.one()
     while found.next_call(meanwhile):
         polyline.before = found.count
         _TRACE_POLYLINE(

@@ -8,8 +8,7 @@
 
 enum { DIGIT = 11, DIGITS = 1 << DIGIT }; /* number of bits, and of values, of a digit */
 
-/* Number of items of scratch that `order_of_groups` takes. */
-EXPORTED int64_t order_items(int64_t s)
+int64_t order_items(int64_t s)
 {
     return s + DIGITS;
 }
@@ -35,10 +34,8 @@ static int sort_by_digit(int64_t s, const int64_t *groups, int shift, const int6
     return OK;
 }
 
-/* Finds the order, (s), in which segments are sorted by their groups, (s), digit by digit. Segments
-   of the same group keep their order. */
-EXPORTED int order_of_groups(int64_t s, const int64_t *groups, double *scratch,
-                             int64_t scratch_items, int64_t *order)
+int order_of_groups(int64_t s, const int64_t *groups, double *scratch, int64_t scratch_items,
+                    int64_t *order)
 {
     Scratch memory = {scratch, scratch_items};
     int64_t *counts, *sorted;
@@ -55,15 +52,6 @@ EXPORTED int order_of_groups(int64_t s, const int64_t *groups, double *scratch,
     }
     return OK;
 }
-
-/* s segments, each in a group whose segments all lie in one face. */
-typedef struct {
-    int64_t s;
-    const int64_t *order;  /* (s) the segments, sorted by their groups */
-    const int64_t *groups; /* (s) */
-    const double *starts;  /* (s, 2) first two barycentric coordinates of the ends in the face */
-    const double *ends;    /* (s, 2) */
-} Segments;
 
 static int boxes_overlap(const double *a, const double *b, const double *c, const double *d,
                          double touching)
@@ -90,14 +78,8 @@ static int reaches_across(const double *a, const double *b, const double *c, con
     return lesser(one, other) <= width && greater(one, other) >= -width;
 }
 
-/* Finds the pairs of segments of one group that have a common point.
-
-   It returns when all pairs have been compared, when there is no room for another one, or after
-   `most_work` comparisons; another call continues. Then `first` is s when all is done.
-
-   touching : distance in barycentric coordinates up to which segments touch */
-EXPORTED int meeting_segments(const Segments *segments, double touching, int64_t most_work,
-                              PairSearch *search)
+int meeting_segments(const Segments *segments, double touching, int64_t most_work,
+                     PairSearch *search)
 {
     int64_t work = 0, s = segments->s;
     while (search->first < s) {

@@ -13,6 +13,32 @@ typedef struct {
     int64_t first, second; /* places in the order of the two segments that are compared next */
 } PairSearch;
 
+/* s segments, each in a group whose segments all lie in one face. */
+typedef struct {
+    int64_t s;
+    const int64_t *order;  /* (s) the segments, sorted by their groups */
+    const int64_t *groups; /* (s) */
+    const double *starts;  /* (s, 2) first two barycentric coordinates of the ends in the face */
+    const double *ends;    /* (s, 2) */
+} Segments;
+
+/* Number of items of scratch that `order_of_groups` takes. */
+EXPORTED int64_t order_items(int64_t s);
+
+/* Finds the order, (s), in which segments are sorted by their groups, (s), digit by digit. Segments
+   of the same group keep their order. */
+EXPORTED int order_of_groups(int64_t s, const int64_t *groups, double *scratch,
+                             int64_t scratch_items, int64_t *order);
+
+/* Finds the pairs of segments of one group that have a common point.
+
+   It returns when all pairs have been compared, when there is no room for another one, or after
+   `most_work` comparisons; another call continues. Then `first` is s when all is done.
+
+   touching : distance in barycentric coordinates up to which segments touch */
+EXPORTED int meeting_segments(const Segments *segments, double touching, int64_t most_work,
+                              PairSearch *search);
+
 int64_t items_of_crossings(int64_t points);
 
 /* Finds the pairs of segments of a polyline, other than neighbours, that have a common point.

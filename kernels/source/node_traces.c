@@ -41,10 +41,9 @@ static int trace_around_edge(const Surface *surface, const NodePlaces *places, c
                     reached, work);
 }
 
-/* Traces from a node to the next one or the previous one, in one of these planes. */
-static int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                      int64_t per_curve, int64_t from, int64_t to, PointList *crossings,
-                      uint8_t *reached, int64_t *work)
+int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+               int64_t per_curve, int64_t from, int64_t to, PointList *crossings, uint8_t *reached,
+               int64_t *work)
 {
     double distance = distance_between(nodes->positions + 3 * to, nodes->positions + 3 * from);
     TraceRequest request = {.start_face = places->faces[from],

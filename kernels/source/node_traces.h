@@ -14,6 +14,14 @@ typedef struct {
     int64_t most_faces;        /* number of faces after which a trace ends */
 } NodePlaces;
 
+/* Traces from a node to the next one or the previous one, in the plane that contains the mean
+   normal of both nodes, or else in the one that contains the mean direction of the curve before and
+   after the step. Its crossings are added if it reaches its end. `work` is raised by the number of
+   faces passed. */
+int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+               int64_t per_curve, int64_t from, int64_t to, PointList *crossings, uint8_t *reached,
+               int64_t *work);
+
 /* The polyline of a curve of n nodes, and what is known about it. */
 typedef struct {
     const uint8_t *is_control;   /* (n) control points, which need not lie strictly inside faces */

@@ -1,8 +1,7 @@
 """Relaxes several curves together, so that their energies can be compared.
 
 Only nodes move; the curves are not traced between them. Each curve is relaxed on its own, with one
-trial step in each iteration. It may cross itself, although the contact term resists it;
-`node_traces.crossing_steps` finds where.
+trial step in each iteration. It may cross itself, although the contact term resists it.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from ..geometry.array_types import BoolArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .curve_nodes import CurveSurface, Nodes, nodes_among, nodes_at
 from .rules import relaxation_rules
 
 
@@ -93,10 +92,4 @@ def relax_batch(
 
 def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     """Some of the curves, by their indices."""
-    size = nodes.per_curve
-    place = (which[:, None] * size + np.arange(size)).ravel()
-    return Nodes(
-        nodes.places[place], nodes.closed, nodes.positions.take(place, axis=0),
-        nodes.normals.take(place, axis=0), nodes.phi_fea.take(place), len(which),
-        None if nodes.corners is None else nodes.corners[place],
-    )  # fmt: skip
+    return nodes_among(nodes, which[:, None] * nodes.per_curve + np.arange(nodes.per_curve))

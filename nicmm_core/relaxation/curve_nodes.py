@@ -216,3 +216,17 @@ def nodes_at(
         surface.for_kernels, *places.for_kernels
     )
     return Nodes(places, closed, positions, normals, phi_fea, curves, corners)
+
+
+def nodes_among(nodes: Nodes, which: IntArray) -> Nodes:
+    """Curves through some of the nodes, whose indices have a row for each curve, (c, n)."""
+    among = which.ravel()
+    return replace(
+        nodes,
+        places=nodes.places[among],
+        positions=nodes.positions.take(among, axis=0),
+        normals=nodes.normals.take(among, axis=0),
+        phi_fea=nodes.phi_fea.take(among),
+        curves=len(which),
+        corners=None if nodes.corners is None else nodes.corners[among],
+    )

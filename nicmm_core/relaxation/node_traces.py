@@ -14,7 +14,6 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.crossings import meeting_segments
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from ..geometry.tracing import MOST_FACES, fold_margin, strictly_inside
@@ -100,22 +99,6 @@ def traced_segments(traces: NodeTraces) -> TracedSegments:
         points.barycentric[first, :2],
         nicmm_kernels.segment_ends(traces.mesh.faces, *points.for_kernels, first),
     )
-
-
-def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
-    """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next nodes cross."""
-    segments = traced_segments(traces_between_nodes(surface, nodes))
-    size, count = nodes.per_curve, len(nodes.positions)
-    curve = segments.node // size
-    group = curve * len(surface.mesh.faces) + segments.face
-    one, other = meeting_segments(group, segments.start, segments.end).T
-    apart = np.abs(one - other)
-    if nodes.closed:
-        first = np.searchsorted(curve, np.arange(nodes.curves + 1))
-        apart = np.minimum(apart, np.diff(first)[curve[one]] - apart)
-    one, other = segments.node[one[apart > 1]], segments.node[other[apart > 1]]
-    pairs = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
-    return np.stack(np.divmod(pairs, count), axis=1)
 
 
 def places_along(

@@ -7,11 +7,12 @@ import igl
 import numpy as np
 
 import nicmm_core as nicmm
+from nicmm_core.geometry.crossings import meeting_segments
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import strictly_inside, trace_between
 from nicmm_core.paper.initial_loop import build_initial_loop
 from nicmm_core.path.initial_path import find_initial_path
-from nicmm_core.relaxation.node_traces import crossing_steps
+from nicmm_core.relaxation.node_traces import traced_segments, traces_between_nodes
 from tests.oracles.checker import judge_curve
 
 
@@ -183,6 +184,22 @@ def grid(count):
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
     return nicmm.Mesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def crossing_steps(surface, nodes):
+    """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next nodes cross."""
+    segments = traced_segments(traces_between_nodes(surface, nodes))
+    size, count = nodes.per_curve, len(nodes.positions)
+    curve = segments.node // size
+    group = curve * len(surface.mesh.faces) + segments.face
+    one, other = meeting_segments(group, segments.start, segments.end).T
+    apart = np.abs(one - other)
+    if nodes.closed:
+        first = np.searchsorted(curve, np.arange(nodes.curves + 1))
+        apart = np.minimum(apart, np.diff(first)[curve[one]] - apart)
+    one, other = segments.node[one[apart > 1]], segments.node[other[apart > 1]]
+    pairs = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
+    return np.stack(np.divmod(pairs, count), axis=1)
 
 
 def simple_curves(surface, nodes):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nicmm_kernels import reordered
 
 from nicmm_core import shapes
-from nicmm_core.courses.uncrossing import remove_crossings, reordered
+from nicmm_core.courses.uncrossing import remove_crossings
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
-from nicmm_core.relaxation.node_traces import crossing_steps
-from tests.core.checks import points_near, simple_curves
+from tests.core.checks import crossing_steps, points_near, simple_curves
 
 
 @pytest.fixture(scope="module")
