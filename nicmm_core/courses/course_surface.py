@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -92,7 +92,7 @@ def edges_crossed(mesh: Mesh) -> float:
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     area = float(mesh.face_areas.sum())
     # Every edge is a side of two faces.
-    return float(sides.sum()) / np.pi * np.sqrt(area / SEARCH_CELLS) / area
+    return float(sides.sum()) / np.pi * np.sqrt(area / SEARCH_CELLS[0]) / area
 
 
 class CourseSurface:
@@ -107,6 +107,9 @@ class CourseSurface:
 
     def __init__(self, given: MappedSurface) -> None:
         self._given, self._mesh = given, given.mesh
+        self._graph: Callable[[int], HopGraph] = cache(
+            lambda cells: build_hop_graph(self._surface.without_maps, cells)
+        )
 
     @cached_property
     def _refined(self) -> Refined:
@@ -141,7 +144,7 @@ class CourseSurface:
         request : Request
         seed : int
             Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
-            no factors.
+            no factors. Searches with different seeds also have different numbers of cells.
         search_size : SearchSize
 
         Raises
@@ -172,7 +175,7 @@ class CourseSurface:
         if edges_crossed(self._refined.mesh) > MOST_CROSSED:
             return
         found = find_courses(
-            self._graph,
+            self._graph(SEARCH_CELLS[seed % len(SEARCH_CELLS)]),
             self._with_maps(request),
             on_refined,
             along,
@@ -188,10 +191,6 @@ class CourseSurface:
             places = self._refined.in_parents(nodes.places)
             control = np.flatnonzero(visit >= 0)
             yield Course(places, control, visited[visit[control]], is_finer)
-
-    @cached_property
-    def _graph(self) -> HopGraph:
-        return build_hop_graph(self._surface.without_maps)
 
     def _with_maps(self, request: Request) -> CurveSurface:
         """The surface that is searched, with the maps of a request."""

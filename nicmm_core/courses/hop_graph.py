@@ -34,8 +34,9 @@ from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.elastic_energy import normal_bending_of_steps
 
-SEARCH_CELLS = 700
-"""Number of cells per component. More cells would refine a course, which relaxation does better."""
+SEARCH_CELLS = (700, 500)
+"""Numbers of cells per component. Searches with different seeds take them in turn, since each graph
+misses other courses. More cells would refine a course, which relaxation does better."""
 
 NORMAL_WEIGHT = 1.2
 """As `geometry.sampling.NORMAL_WEIGHT`, but larger: courses around thin limbs need cells there."""
@@ -122,15 +123,15 @@ class HopGraph:
         return indptr, after, turn**2 / mean_length(hops, before, hops, after)
 
 
-def build_hop_graph(surface: CurveSurface) -> HopGraph:
-    """Build the hop graph of a connected surface."""
+def build_hop_graph(surface: CurveSurface, cells: int = SEARCH_CELLS[0]) -> HopGraph:
+    """Build the hop graph of a connected surface with at most a number of cells."""
     mesh = surface.mesh
     areas = np.zeros(len(mesh.vertices))
     np.add.at(areas, mesh.faces, mesh.face_areas[:, None] / 3.0)
     vertex = np.flatnonzero(areas > 0.0)
-    spacing = float(np.sqrt(areas.sum() / min(SEARCH_CELLS, len(vertex))))
-    if len(vertex) > SEARCH_CELLS:
-        candidates, distance = CANDIDATES * SEARCH_CELLS, PACKING * spacing
+    spacing = float(np.sqrt(areas.sum() / min(cells, len(vertex))))
+    if len(vertex) > cells:
+        candidates, distance = CANDIDATES * cells, PACKING * spacing
         frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
         normals = surface.vertex_normals
         vertex = spread_vertices(mesh, frame, normals, areas, candidates, distance, NORMAL_WEIGHT)

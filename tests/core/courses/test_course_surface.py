@@ -25,7 +25,7 @@ def test_edges_crossed_are_counted_by_random_lines():
     n = 40
     disc = shapes.disc(n)
     generator = np.random.default_rng(1)
-    length = np.sqrt(disc.face_areas.sum() / SEARCH_CELLS)
+    length = np.sqrt(disc.face_areas.sum() / SEARCH_CELLS[0])
     angle = generator.uniform(0.0, 2.0 * np.pi, 500)
     start = generator.uniform(-0.6, 0.6, (500, 2))
     end = start + length * np.column_stack([np.cos(angle), np.sin(angle)])
