@@ -405,20 +405,25 @@ class Designer:
         options |= {"closed": closed, **shape}
         left = 1.0  # of the progress; each curve takes half of it
 
-        def curve_through(points: SurfacePoints, line: Line | None) -> SurfaceCurve | None:
+        def curve_through(points: SurfacePoints, line: Line, along: bool) -> SurfaceCurve | None:
             nonlocal left
             request = self._request(points, checked_options(self.mesh, options))
             manifold, there = next(self._manifolds(request))
-            begin = None
-            if line is not None:
-                positions = manifold.from_original(line.positions)
-                begin = manifold.curve_along(positions, closed, line.control_index)
-                if begin is None:
-                    return None
+            positions = manifold.from_original(line.positions)
+            begin = manifold.curve_along(positions, closed, line.control_index)
+            if begin is None and along:
+                return None
+            designer, found = manifold.designer, None
             with placed(manifold.in_original), subrange(1.0 - left, 1.0 - 0.5 * left):
-                found = manifold.designer.design(there, time.perf_counter(), begin)
+                if begin is not None:
+                    with contextlib.suppress(*(() if along else (CurveError,))):
+                        found = designer.design(there, time.perf_counter(), begin)
+                if not along:
+                    rival = None if found is None else found.resumable
+                    found = designer.design(there, time.perf_counter(), rival=rival)
+            assert found is not None
             checkpoint()  # a cancelled design may have an unfinished curve
-            left *= 0.5 if line is None else 1.0
+            left *= 1.0 if along else 0.5
             return only_curve(manifold.design_on_original(found, request), "design")
 
         return fitted_points(self.mesh, stroke, tolerance, closed, curve_through)

@@ -125,6 +125,9 @@ class Improvement:
         Number of courses transferred from the coarse mesh for earlier requests.
     starts, relaxed : lists of InitialCurve and of Relaxed
         The start and the result of each attempt.
+    rival : DiscreteCurve or None
+        A relaxed curve through the same points. No attempt follows when the best curve has less
+        energy and takes another course.
     searches, parts : int
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     path_tried : bool
@@ -140,6 +143,7 @@ class Improvement:
     transferred_before: int
     starts: list[InitialCurve] = field(default_factory=list)
     relaxed: list[Relaxed] = field(default_factory=list)
+    rival: DiscreteCurve | None = None
     searches: int = 1
     parts: int = 0
     path_tried: bool = False
@@ -164,6 +168,8 @@ class Improvement:
             require, there are no searches. If no course was simple, further searches would hardly
             find one and take long, so they are made only for alternatives.
         """
+        if self._has_beaten_rival:
+            return
         request, self.path_tried = self.request, start_kind is StartKind.PATH
         further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
         if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
@@ -422,4 +428,13 @@ class Improvement:
         return WORK_OF_SEARCH * (1 + len(self.request.points) + via_points)
 
     def _is_affordable(self, further: float) -> bool:
-        return self._work + further <= MOST_WORK
+        return self._work + further <= MOST_WORK and not self._has_beaten_rival
+
+    @property
+    def _has_beaten_rival(self) -> bool:
+        if self.rival is None:
+            return False
+        best, scale = self.curves[self.best], self.curves[0].length
+        both = [best, self.rival]
+        energy, of_rival = energies_of(self._surface, both, self.request.smoothness, scale)
+        return energy < of_rival and is_apart(self._surface, best, [self.rival])

@@ -64,7 +64,7 @@ DENSE = 0.1
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 4, 2
+MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 5, 3
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
 are designed without a start in each part of the third one; fewer in its last part."""
 
@@ -83,8 +83,10 @@ class Line(NamedTuple):
     control_index: IntArray
 
 
-Curves = Callable[[SurfacePoints, Line | None], SurfaceCurve | None]
-"""Designs the curve through control points, or relaxes it from a line if there is a curve along it.
+Curves = Callable[[SurfacePoints, Line, bool], SurfaceCurve | None]
+"""Designs the curve through control points. If the last argument is True, it is relaxed from the
+line, if there is a curve along it; else the design may end with any curve that has less energy than
+this one and takes another course.
 """
 
 
@@ -145,7 +147,7 @@ def fitted_points(
         In mesh units.
     closed : bool
     design : callable
-        Designs the curve through control points, or relaxes it from a line; see `Curves`.
+        Designs the curve through control points; see `Curves`.
 
     Raises
     ------
@@ -219,8 +221,8 @@ class _Fit:
             curve = None
             # Two of the points may coincide, or lie on different parts.
             with contextlib.suppress(ControlPointError, UnreachableError, CurveError):
-                line = Line(self.places, knots) if along else None
-                curve = self.design(self.points(knots), line)
+                line = Line(self.places, knots)
+                curve = self.design(self.points(knots), line, along)
             missing = np.arange(0) if curve is None else self.missing(knots, curve)
             if curve is not None and not len(missing):
                 return knots
