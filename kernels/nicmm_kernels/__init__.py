@@ -27,6 +27,7 @@ from .levels import (
     place_on_polyline,
 )
 from .library import KernelError, MissingLibraryError
+from .mesh_measures import area_vectors, connected_components, edge_lengths
 from .nearest_places import nearest_places
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
@@ -76,13 +77,16 @@ __all__ = [
     "TooManyWindowsError",
     "TraceLimits",
     "UncrossingRules",
+    "area_vectors",
     "best_legs",
     "cell_sets",
+    "connected_components",
     "conormal_derivatives",
     "damped_step",
     "distances_along_edges",
     "distinct_curves",
     "distinct_routes",
+    "edge_lengths",
     "even_places",
     "find_contacts",
     "least_sums",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
+import nicmm_kernels
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
@@ -81,12 +80,12 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     (size,) int array
         Index of the component of each node; components are in the order of their first nodes.
     """
-    arcs = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
-    arcs.has_canonical_format = True  # repeated arcs need not be summed
-    graph = arcs.tocsr()
-    checkpoint()
-    number, label = csgraph.connected_components(graph, directed=False)
-    return int(number), label.astype(np.int64)
+    return nicmm_kernels.connected_components(
+        size,
+        np.ascontiguousarray(one, np.int64),
+        np.ascontiguousarray(other, np.int64),
+        checkpoint,
+    )
 
 
 def first_of_components(size: int, one: IntArray, other: IntArray) -> IntArray:

@@ -16,7 +16,7 @@ from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
 from .tolerances import TINY
-from .vectors import cross, lengths
+from .vectors import lengths
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Upper bound on coordinates and lower bound on the diagonal of the mesh, so that powers of lengths
@@ -298,8 +298,7 @@ def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Normals whose lengths are twice the areas of the faces, shape (F, 3)."""
-    origin, one, other = (np.take(vertices, corner, axis=0) for corner in faces.T)
-    return np.ascontiguousarray(cross((one - origin).T, (other - origin).T).T)
+    return nicmm_kernels.area_vectors(*_contiguous(vertices, faces), checkpoint)
 
 
 def opposite_sides(faces: IntArray) -> IntArray:
@@ -316,8 +315,12 @@ def opposite_sides(faces: IntArray) -> IntArray:
 
 def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
     """Length of each edge, shape (E,)."""
-    start, end = (np.take(vertices, of_edge, axis=0) for of_edge in edges.T)
-    return lengths((end - start).T)
+    return nicmm_kernels.edge_lengths(*_contiguous(vertices, edges), checkpoint)
+
+
+def _contiguous(vertices: FloatArray, simplices: IntArray) -> tuple[FloatArray, IntArray]:
+    """Arrays as compiled kernels read them."""
+    return np.ascontiguousarray(vertices), np.ascontiguousarray(simplices, np.int64)
 
 
 def feet_on_edges(
