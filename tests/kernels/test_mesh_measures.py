@@ -1,4 +1,4 @@
-"""Measures of meshes are those of NumPy, and components those of SciPy, however they are divided."""
+"""Measures are those of NumPy, and components those of SciPy, however the work is divided."""
 
 import nicmm_kernels
 import numpy as np
