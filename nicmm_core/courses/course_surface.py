@@ -172,7 +172,7 @@ class CourseSurface:
             fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
             corners = request.are_corners(visited)
             along = along[visited][:, np.append(np.arange(size), size + visited)]
-        if edges_crossed(self._refined.mesh) > MOST_CROSSED:
+        if self._has_needles:
             return
         found = find_courses(
             self._graph(SEARCH_CELLS[seed % len(SEARCH_CELLS)]),
@@ -191,6 +191,10 @@ class CourseSurface:
             places = self._refined.in_parents(nodes.places)
             control = np.flatnonzero(visit >= 0)
             yield Course(places, control, visited[visit[control]], is_finer)
+
+    @cached_property
+    def _has_needles(self) -> bool:
+        return edges_crossed(self._refined.mesh) > MOST_CROSSED
 
     def _with_maps(self, request: Request) -> CurveSurface:
         """The surface that is searched, with the maps of a request."""
