@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
-from threading import Event
+from threading import Event, Lock
 from typing import TypeVar
 
 THREADS_VARIABLE = "NICMM_THREADS"
@@ -19,6 +19,9 @@ THREADS_VARIABLE = "NICMM_THREADS"
 
 MOST_THREADS = 8
 """Greatest number of threads without this variable; more would hardly gain anything."""
+
+PARTS_OF_A_THREAD = 4
+"""Number of parts that a thread computes in turn, since some rows take longer than others."""
 
 PATIENCE = 0.02
 """Seconds between two calls of the caller's function while other threads compute."""
@@ -71,34 +74,47 @@ def in_threads(
     fewest : int
         Least number of rows for which another thread is worthwhile.
     """
-    parts = min(thread_count(), count // fewest)
-    if parts <= 1:
+    threads = min(thread_count(), count // fewest)
+    if threads <= 1:
         return [compute(slice(0, count), meanwhile)]
+    parts = min(PARTS_OF_A_THREAD * threads, count // fewest)
     bounds = [count * part // parts for part in range(parts + 1)]
     slices = [slice(*pair) for pair in zip(bounds, bounds[1:], strict=False)]
-    stop = Event()
+    results: list[list[Result]] = [[] for _ in slices]
+    left, lock, stop = list(range(parts))[::-1], Lock(), Event()
 
     def check() -> None:
         if stop.is_set():
             raise _StoppedError
 
-    others = [_executor().submit(compute, rows, check) for rows in slices[1:]]
+    def check_and_ask() -> None:
+        check()
+        meanwhile()
+
+    def compute_parts(meanwhile: Meanwhile) -> None:
+        try:
+            while True:
+                with lock:
+                    if not left:
+                        return
+                    part = left.pop()
+                results[part].append(compute(slices[part], meanwhile))
+        except BaseException:
+            stop.set()
+            raise
+
+    others = [_executor().submit(compute_parts, check) for _ in range(threads - 1)]
     try:
-        first = compute(slices[0], meanwhile)
-        _wait(others, meanwhile)
-    except BaseException:
+        compute_parts(check_and_ask)
+        while wait(others, PATIENCE, FIRST_EXCEPTION).not_done:
+            check_and_ask()
+    except BaseException as error:
         stop.set()
         wait(others)
-        raise
-    return [first, *(other.result() for other in others)]
-
-
-def _wait(futures: list[Future[Result]], meanwhile: Meanwhile) -> None:
-    """Wait until all are done; raises the error of the first one that has failed."""
-    waiting = set(futures)
-    while waiting:
-        done, waiting = wait(waiting, PATIENCE, FIRST_EXCEPTION)
-        for future in done:
-            future.result()
-        if waiting:
-            meanwhile()
+        if not isinstance(error, _StoppedError):
+            raise
+    for other in others:
+        problem = other.exception()
+        if problem is not None and not isinstance(problem, _StoppedError):
+            raise problem
+    return [result for (result,) in results]

@@ -87,7 +87,7 @@ seem to bend less than they do.
 MOST_DOUBLINGS = 2
 """Number of times that the nodes of courses are doubled at most."""
 
-KEPT_WHEN_DOUBLED, FEWEST_DOUBLED = 0.6, 12
+KEPT_WHEN_DOUBLED, FEWEST_DOUBLED = 0.45, 12
 """Share of the courses that are kept when nodes are doubled, the best ones by their energies with
 twice as many nodes; and the number that is kept anyway."""
 

@@ -41,7 +41,8 @@ def squares(rows, meanwhile):
 def test_results_come_in_order(count, rows):
     parts = threads.in_threads(squares, rows, lambda: None)
     assert [each for part in parts for each in part] == [row * row for row in range(rows)]
-    assert len(parts) == max(1, min(count, rows))
+    used = min(count, rows)
+    assert len(parts) == (min(threads.PARTS_OF_A_THREAD * used, rows) if used > 1 else 1)
 
 
 def test_few_rows_are_not_shared(count):
