@@ -413,15 +413,15 @@ class Designer:
             begin = manifold.curve_along(positions, closed, line.control_index)
             if begin is None and along:
                 return None
-            designer, found = manifold.designer, None
+            designer, started, rival = manifold.designer, time.perf_counter(), None
             with placed(manifold.in_original), subrange(1.0 - left, 1.0 - 0.5 * left):
-                if begin is not None:
-                    with contextlib.suppress(*(() if along else (CurveError,))):
-                        found = designer.design(there, time.perf_counter(), begin)
-                if not along:
-                    rival = None if found is None else found.resumable
-                    found = designer.design(there, time.perf_counter(), rival=rival)
-            assert found is not None
+                if along:
+                    found = designer.design(there, started, begin)
+                else:
+                    if begin is not None:
+                        with contextlib.suppress(CurveError):  # the points may be off the line
+                            rival = designer.design(there, started, begin).resumable
+                    found = designer.design(there, started, rival=rival)
             checkpoint()  # a cancelled design may have an unfinished curve
             left *= 1.0 if along else 0.5
             return only_curve(manifold.design_on_original(found, request), "design")
