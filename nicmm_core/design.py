@@ -405,15 +405,19 @@ class Designer:
         options |= {"closed": closed, **shape}
         left = 1.0  # of the progress; each curve takes half of it
 
-        def curve_through(points: SurfacePoints, line: Line, along: bool) -> SurfaceCurve | None:
+        def curve_through(
+            points: SurfacePoints, line: Line | None, along: bool
+        ) -> tuple[SurfaceCurve | None, bool]:
             nonlocal left
             request = self._request(points, checked_options(self.mesh, options))
             manifold, there = next(self._manifolds(request))
-            positions = manifold.from_original(line.positions)
-            begin = manifold.curve_along(positions, closed, line.control_index)
+            designer, started = manifold.designer, time.perf_counter()
+            begin = rival = None
+            if line is not None:
+                positions = manifold.from_original(line.positions)
+                begin = manifold.curve_along(positions, closed, line.control_index)
             if begin is None and along:
-                return None
-            designer, started, rival = manifold.designer, time.perf_counter(), None
+                return None, True
             with placed(manifold.in_original), subrange(1.0 - left, 1.0 - 0.5 * left):
                 if along:
                     found = designer.design(there, started, begin)
@@ -422,9 +426,10 @@ class Designer:
                         with contextlib.suppress(CurveError):  # the points may be off the line
                             rival = designer.design(there, started, begin).resumable
                     found = designer.design(there, started, rival=rival)
-            checkpoint()  # a cancelled design may have an unfinished curve
+            checkpoint()  # a design that the caller has cancelled may have an unfinished curve
             left *= 1.0 if along else 0.5
-            return only_curve(manifold.design_on_original(found, request), "design")
+            curve = only_curve(manifold.design_on_original(found, request), "design")
+            return curve, found.status is not Status.CANCELLED
 
         return fitted_points(self.mesh, stroke, tolerance, closed, curve_through)
 

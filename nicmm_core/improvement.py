@@ -168,7 +168,7 @@ class Improvement:
             require, there are no searches. If no course was simple, further searches would hardly
             find one and take long, so they are made only for alternatives.
         """
-        if self._has_beaten_rival:
+        if self.has_beaten_rival:
             return
         request, self.path_tried = self.request, start_kind is StartKind.PATH
         further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
@@ -307,6 +307,16 @@ class Improvement:
         """Index of the curve of least energy."""
         return self.energies.index(min(self.energies))
 
+    @property
+    def has_beaten_rival(self) -> bool:
+        """Whether the best curve has less energy than the rival, and takes another course."""
+        if self.rival is None:
+            return False
+        best, scale = self.curves[self.best], self.curves[0].length
+        both = [best, self.rival]
+        energy, of_rival = energies_of(self._surface, both, self.request.smoothness, scale)
+        return energy < of_rival and is_apart(self._surface, best, [self.rival])
+
     def relative_energies(self) -> list[float]:
         """The same energies, relative to that of the best curve."""
         scale = self.curves[0].length
@@ -428,13 +438,4 @@ class Improvement:
         return WORK_OF_SEARCH * (1 + len(self.request.points) + via_points)
 
     def _is_affordable(self, further: float) -> bool:
-        return self._work + further <= MOST_WORK and not self._has_beaten_rival
-
-    @property
-    def _has_beaten_rival(self) -> bool:
-        if self.rival is None:
-            return False
-        best, scale = self.curves[self.best], self.curves[0].length
-        both = [best, self.rival]
-        energy, of_rival = energies_of(self._surface, both, self.request.smoothness, scale)
-        return energy < of_rival and is_apart(self._surface, best, [self.rival])
+        return self._work + further <= MOST_WORK and not self.has_beaten_rival

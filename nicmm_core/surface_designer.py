@@ -102,7 +102,7 @@ class SurfaceDesigner:
             Limit on the total number of iterations of the relaxation.
         rival : Resumable, optional
             A curve through the same points on this mesh. Without a start, the design ends when its
-            best curve has less energy and takes another course.
+            best curve has less energy and takes another course; the status is `CANCELLED` then.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class SurfaceDesigner:
     def _curves(
         self, request: Request, max_iterations: int | None, rival: Resumable | None = None
     ) -> tuple[list[ComparedCurve], bool]:
-        """Distinct curves by ascending energy, and whether the search was cancelled."""
+        """Distinct curves by ascending energy, and whether the search has ended early."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
             courses = search.courses(request, insist=True)
@@ -239,6 +239,7 @@ class SurfaceDesigner:
             )
             try:
                 improvement.improve(courses, kind)
+                cancelled = improvement.has_beaten_rival
             except CancelledError:
                 cancelled = True
         starts, relaxed = improvement.starts, improvement.relaxed

@@ -61,10 +61,13 @@ SPARSE = 2
 DENSE = 0.1
 """Distance of the samples between which distances of lines are measured, in tolerances."""
 
+WITHIN = 0.99
+"""Greatest distance of a sample, in tolerances; points between samples may be farther away."""
+
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 5, 3
+MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 6, 4
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
 are designed without a start in each part of the third one; fewer in its last part."""
 
@@ -83,10 +86,12 @@ class Line(NamedTuple):
     control_index: IntArray
 
 
-Curves = Callable[[SurfacePoints, Line, bool], SurfaceCurve | None]
-"""Designs the curve through control points. If the last argument is True, it is relaxed from the
-line, if there is a curve along it; else the design may end with any curve that has less energy than
-this one and takes another course.
+Curves = Callable[[SurfacePoints, Line | None, bool], tuple[SurfaceCurve | None, bool]]
+"""Designs the curve through control points, and tells whether the design is complete.
+
+If the last argument is True, the curve is relaxed from the line, if there is a curve along it.
+Otherwise the design is incomplete if it has ended with a curve that has less energy than the one
+along the line and takes another course; without a line it is always complete.
 """
 
 
@@ -221,8 +226,7 @@ class _Fit:
             curve = None
             # Two of the points may coincide, or lie on different parts.
             with contextlib.suppress(ControlPointError, UnreachableError, CurveError):
-                line = Line(self.places, knots)
-                curve = self.design(self.points(knots), line, along)
+                curve = self._curve(knots, along)
             missing = np.arange(0) if curve is None else self.missing(knots, curve)
             if curve is not None and not len(missing):
                 return knots
@@ -235,6 +239,14 @@ class _Fit:
                 return None
             knots = finer
         return None
+
+    def _curve(self, knots: IntArray, along: bool) -> SurfaceCurve | None:
+        """The curve through knots. If it stays near the stroke, its design is complete."""
+        points = self.points(knots)
+        curve, complete = self.design(points, Line(self.places, knots), along)
+        if curve is not None and not complete and not len(self.missing(knots, curve)):
+            curve, _ = self.design(points, None, along)
+        return curve
 
     def close(self, knots: IntArray) -> IntArray:
         """Knots, with others added beside those where lines between them turn much.
@@ -265,7 +277,7 @@ class _Fit:
         away = np.concatenate(
             [cKDTree(line).query(self.stroke)[0], cKDTree(self.stroke).query(line)[0]]
         )
-        far = np.flatnonzero(away > self.tolerance)
+        far = np.flatnonzero(away > WITHIN * self.tolerance)
         far = far[np.argsort(-away[far], kind="stable")]
         place = cKDTree(self.places).query(both[far])[1]
         gap = np.searchsorted(knots, place, side="right")

@@ -1,11 +1,12 @@
-"""Tests of removing points at which a polyline turns back along an edge."""
+"""Tests of curves across removed faces: where they turn back, and whether they are simple."""
 
 import numpy as np
 import pytest
 
 import nicmm_core as nicmm
+from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.repair.removed_faces import without_backtracking
+from nicmm_core.repair.removed_faces import RemovedFaces, without_backtracking
 
 MESH = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 1, 2], [1, 0, 3]])
 
@@ -51,3 +52,35 @@ def test_a_turn_inside_a_face_stays():
     polyline = SurfacePoints(np.zeros(4, dtype=int), weights)
     found, _ = without_backtracking(MESH, polyline, np.array([], dtype=int), closed=False)
     assert len(found) == 4
+
+
+SOUP = nicmm.Mesh(MESH.vertices[MESH.faces.ravel()], np.arange(6).reshape(2, 3))
+
+
+def curve_in_plane(mesh, faces, positions, closed):
+    """A curve through positions, (n, 2), each given in a face."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    plane = np.ones((len(faces), 3, 3))
+    plane[:, :2] = corners[:, :, :2].transpose(0, 2, 1)
+    wanted = np.column_stack([positions, np.ones(len(faces))])
+    weights = np.linalg.solve(plane, wanted[:, :, None])[:, :, 0].round(12)
+    return curve_on_mesh(mesh, closed, np.asarray(faces), weights, np.array([0, len(faces) - 1]))
+
+
+@pytest.mark.parametrize("mesh", [MESH, SOUP])
+@pytest.mark.parametrize(
+    ("faces", "positions", "closed", "simple"),
+    [
+        ([0] * 4, [[0.1, 0.1], [0.5, 0.1], [0.5, 0.4], [0.1, 0.4]], True, True),
+        ([0] * 4, [[0.1, 0.1], [0.5, 0.4], [0.5, 0.1], [0.1, 0.4]], True, False),
+        ([0, 0, 1], [[0.2, 0.2], [0.3, 0.0], [0.3, -0.2]], False, True),
+        ([0, 1, 1], [[0.2, 0.2], [0.3, 0.0], [0.3, -0.2]], False, True),
+        ([0, 1], [[0.2, 0.2], [0.3, -0.2]], False, False),  # no face has both points
+        ([0, 0, 1, 1, 0], [[0.2, 0.2], [0.5, 0], [0.2, -0.2], [0.5, 0], [0.5, 0.2]], False, False),
+        ([0, 0, 1, 1, 0], [[0.2, 0.2], [0, 0], [0.2, -0.2], [0, 0], [0.5, 0.2]], False, False),
+    ],
+)
+def test_whether_a_curve_is_simple(mesh, faces, positions, closed, simple):
+    """Also where the faces share no vertices, which were joined."""
+    removed = RemovedFaces(mesh, MESH.faces, np.zeros(2, dtype=bool))
+    assert removed.is_simple(curve_in_plane(mesh, faces, positions, closed)) is simple
