@@ -212,8 +212,8 @@ class Designer:
         self,
         request: Request,
         started: float,
-        start: Design | SurfaceCurve | None,
-        max_iterations: int | None,
+        start: Design | SurfaceCurve | None = None,
+        max_iterations: int | None = None,
     ) -> Design:
         """The design on the first manifold whose curve can be mapped back to the given mesh.
 
@@ -405,33 +405,31 @@ class Designer:
         options |= {"closed": closed, **shape}
         left = 1.0  # of the progress; each curve takes half of it
 
-        def curve_through(
-            points: SurfacePoints, line: Line | None, along: bool
-        ) -> tuple[SurfaceCurve | None, bool]:
+        def curve_through(points: SurfacePoints, line: Line | None) -> SurfaceCurve | None:
             nonlocal left
             request = self._request(points, checked_options(self.mesh, options))
-            manifold, there = next(self._manifolds(request))
-            designer, started = manifold.designer, time.perf_counter()
-            begin = rival = None
-            if line is not None:
-                positions = manifold.from_original(line.positions)
-                begin = manifold.curve_along(positions, closed, line.control_index)
-            if begin is None and along:
-                return None, True
-            with placed(manifold.in_original), subrange(1.0 - left, 1.0 - 0.5 * left):
-                if along:
-                    found = designer.design(there, started, begin)
-                else:
-                    if begin is not None:
-                        with contextlib.suppress(CurveError):  # the points may be off the line
-                            rival = designer.design(there, started, begin).resumable
-                    found = designer.design(there, started, rival=rival)
-            checkpoint()  # a design that the caller has cancelled may have an unfinished curve
-            left *= 1.0 if along else 0.5
-            curve = only_curve(manifold.design_on_original(found, request), "design")
-            return curve, found.status is not Status.CANCELLED
+            with subrange(1.0 - left, 1.0 - 0.5 * left):
+                found = (
+                    self._designed(request, time.perf_counter())
+                    if line is None
+                    else self._relaxed_from(request, line)
+                )
+            checkpoint()  # a cancelled design may have an unfinished curve
+            left *= 0.5 if line is None else 1.0
+            return None if found is None else only_curve(found, "design")
 
         return fitted_points(self.mesh, stroke, tolerance, closed, curve_through)
+
+    def _relaxed_from(self, request: Request, line: Line) -> Design | None:
+        """The curve relaxed from a line; None if there is no curve along it."""
+        manifold, there = next(self._manifolds(request))
+        positions = manifold.from_original(line.positions)
+        begin = manifold.curve_along(positions, request.closed, line.control_index)
+        if begin is None:
+            return None
+        with placed(manifold.in_original):
+            found = manifold.designer.design(there, time.perf_counter(), begin)
+        return manifold.design_on_original(found, request)
 
     def measures(
         self,
@@ -528,7 +526,7 @@ class Designer:
         Raises
         ------
         UnreachableError
-            If there is none.
+            If no manifold connects them.
         """
         surface = self._surface_off_obstacles(request)
         kept_off = None if request.avoid is None else self._surface_off_curves(surface, request)

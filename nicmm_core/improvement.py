@@ -125,9 +125,6 @@ class Improvement:
         Number of courses transferred from the coarse mesh for earlier requests.
     starts, relaxed : lists of InitialCurve and of Relaxed
         The start and the result of each attempt.
-    rival : DiscreteCurve or None
-        A relaxed curve through the same points. No attempt follows when the best curve has less
-        energy and takes another course.
     searches, parts : int
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     path_tried : bool
@@ -143,7 +140,6 @@ class Improvement:
     transferred_before: int
     starts: list[InitialCurve] = field(default_factory=list)
     relaxed: list[Relaxed] = field(default_factory=list)
-    rival: DiscreteCurve | None = None
     searches: int = 1
     parts: int = 0
     path_tried: bool = False
@@ -168,8 +164,6 @@ class Improvement:
             require, there are no searches. If no course was simple, further searches would hardly
             find one and take long, so they are made only for alternatives.
         """
-        if self.has_beaten_rival:
-            return
         request, self.path_tried = self.request, start_kind is StartKind.PATH
         further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
         if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
@@ -307,16 +301,6 @@ class Improvement:
         """Index of the curve of least energy."""
         return self.energies.index(min(self.energies))
 
-    @property
-    def has_beaten_rival(self) -> bool:
-        """Whether the best curve has less energy than the rival, and takes another course."""
-        if self.rival is None:
-            return False
-        best, scale = self.curves[self.best], self.curves[0].length
-        both = [best, self.rival]
-        energy, of_rival = energies_of(self._surface, both, self.request.smoothness, scale)
-        return energy < of_rival and is_apart(self._surface, best, [self.rival])
-
     def relative_energies(self) -> list[float]:
         """The same energies, relative to that of the best curve."""
         scale = self.curves[0].length
@@ -438,4 +422,4 @@ class Improvement:
         return WORK_OF_SEARCH * (1 + len(self.request.points) + via_points)
 
     def _is_affordable(self, further: float) -> bool:
-        return self._work + further <= MOST_WORK and not self.has_beaten_rival
+        return self._work + further <= MOST_WORK

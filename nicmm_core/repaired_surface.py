@@ -27,13 +27,7 @@ from .design_result import Design
 from .errors import CurveError, UnreachableError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import (
-    SurfaceCurve,
-    checked_curve,
-    curve_on_mesh,
-    lies_on,
-    weights_in_faces,
-)
+from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, lies_on, weights_in_faces
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, coincide, joined

@@ -87,7 +87,6 @@ class SurfaceDesigner:
         started: float,
         start: Resumable | SurfaceCurve | None = None,
         max_iterations: int | None = None,
-        rival: Resumable | None = None,
     ) -> Design:
         """Design a curve.
 
@@ -100,9 +99,6 @@ class SurfaceDesigner:
             A curve on this mesh from which the method "elastic" starts.
         max_iterations : int, optional
             Limit on the total number of iterations of the relaxation.
-        rival : Resumable, optional
-            A curve through the same points on this mesh. Without a start, the design ends when its
-            best curve has less energy and takes another course; the status is `CANCELLED` then.
 
         Raises
         ------
@@ -114,7 +110,7 @@ class SurfaceDesigner:
         if request.method == "elastic":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
-            return self._designed(request, max_iterations, started, rival)
+            return self._designed(request, max_iterations, started)
         from .paper.level_set_design import level_set_design  # only the other methods need it
 
         return level_set_design(self.mesh, request, started)
@@ -202,23 +198,17 @@ class SurfaceDesigner:
             if len(tried) == TRIED:
                 break
 
-    def _designed(
-        self,
-        request: Request,
-        max_iterations: int | None,
-        started: float,
-        rival: Resumable | None,
-    ) -> Design:
+    def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
         if request.mirror is not None:
             return self._designed_symmetric(request, max_iterations, started)
-        curves, cancelled = self._curves(request, max_iterations, rival)
+        curves, cancelled = self._curves(request, max_iterations)
         return self._with_alternatives(request, curves, cancelled, started)
 
     def _curves(
-        self, request: Request, max_iterations: int | None, rival: Resumable | None = None
+        self, request: Request, max_iterations: int | None
     ) -> tuple[list[ComparedCurve], bool]:
-        """Distinct curves by ascending energy, and whether the search has ended early."""
+        """Distinct curves by ascending energy, and whether the search was cancelled."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
             courses = search.courses(request, insist=True)
@@ -235,11 +225,9 @@ class SurfaceDesigner:
                 before,
                 [start],
                 [first],
-                None if rival is None else rival.curve,
             )
             try:
                 improvement.improve(courses, kind)
-                cancelled = improvement.has_beaten_rival
             except CancelledError:
                 cancelled = True
         starts, relaxed = improvement.starts, improvement.relaxed

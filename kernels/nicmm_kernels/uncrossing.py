@@ -121,8 +121,9 @@ def remove_crossings(
     order, simple = np.empty((c, n), dtype=np.int64), np.empty(c, dtype=bool)
 
     def remove(part: slice, meanwhile: Callable[[], object]) -> None:
-        curves = _CrossingCurves(c, n, control.ctypes.data, order.ctypes.data, simple.ctypes.data)
-        curves.c = part.stop
+        curves = _CrossingCurves(
+            part.stop, n, control.ctypes.data, order.ctypes.data, simple.ctypes.data
+        )
         done, room = COUNT(part.start), POINTS_OF_A_NODE * n + limits.most_faces + 2
         while done.value < part.stop:
             if done.value > part.start:

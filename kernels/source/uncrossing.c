@@ -224,7 +224,7 @@ EXPORTED int reordered_nodes(int64_t n, int64_t count, const int64_t *crossings,
     return OK;
 }
 
-/* c curves of n nodes each. */
+/* Curves of n nodes each, up to that of index c. */
 typedef struct {
     int64_t c, n;
     const uint8_t *control; /* (c, n) control points; the first node of each curve is one */
@@ -245,7 +245,7 @@ typedef struct {
     int64_t *keys;          /* (room) pairs of nodes whose steps cross, as one number each */
     Reordering reordering;
     Scratch sorting;
-} Workspace;
+} CurveSpace;
 
 /* Number of items of scratch for curves of n nodes whose traces have up to `room` points. */
 EXPORTED int64_t uncrossing_items(int64_t n, int64_t room, int64_t most_crossings)
@@ -254,7 +254,7 @@ EXPORTED int64_t uncrossing_items(int64_t n, int64_t room, int64_t most_crossing
 }
 
 static int take_space(Scratch scratch, int64_t n, int64_t closed, int64_t room,
-                      int64_t most_crossings, Workspace *space)
+                      int64_t most_crossings, CurveSpace *space)
 {
     Nodes *nodes = &space->nodes;
     PointList *points = &space->points;
@@ -303,7 +303,7 @@ static int gather(const NodePlaces *places, const Nodes *given, int64_t first, c
 }
 
 /* Traces the steps between the nodes; where a trace fails, there are no points. */
-static int trace_all(const Surface *surface, const NodePlaces *limits, Workspace *space,
+static int trace_all(const Surface *surface, const NodePlaces *limits, CurveSpace *space,
                      int64_t *work)
 {
     const Nodes *nodes = &space->nodes;
@@ -326,7 +326,7 @@ static int trace_all(const Surface *surface, const NodePlaces *limits, Workspace
 }
 
 /* Divides the traces into segments, and returns their number in `count`. */
-static int find_segments(const Mesh *mesh, Workspace *space, int64_t *count)
+static int find_segments(const Mesh *mesh, CurveSpace *space, int64_t *count)
 {
     const PointList *points = &space->points;
     int64_t s = 0;
@@ -348,7 +348,7 @@ static int find_segments(const Mesh *mesh, Workspace *space, int64_t *count)
 
 /* Finds the pairs of steps that cross. There are too many of them, one more than `most`, also if
    more segments meet than there is room for. */
-static int find_crossing_steps(const Mesh *mesh, double touching, int64_t most, Workspace *space,
+static int find_crossing_steps(const Mesh *mesh, double touching, int64_t most, CurveSpace *space,
                                int64_t *work)
 {
     int64_t s, n = space->nodes.n, count = 0;
@@ -387,7 +387,7 @@ static int find_crossing_steps(const Mesh *mesh, double touching, int64_t most, 
 /* Removes the crossings of one curve. */
 static int uncross(const Surface *surface, const NodePlaces *limits, const Nodes *given,
                    const UncrossingRules *rules, const CrossingCurves *curves, int64_t number,
-                   Workspace *space, uint8_t *control, int64_t *work)
+                   CurveSpace *space, uint8_t *control, int64_t *work)
 {
     int64_t n = curves->n, first = number * n, *order = curves->order + first;
     Reordering *curve = &space->reordering;
@@ -424,7 +424,7 @@ EXPORTED int remove_crossings(const Surface *surface, const NodePlaces *places, 
                               int64_t most_work, int64_t *done)
 {
     Scratch memory = {scratch, scratch_items};
-    Workspace space;
+    CurveSpace space;
     uint8_t *control;
     int64_t work = 0;
     TRY(take_bytes(&memory, curves->n, &control));

@@ -110,7 +110,7 @@ class RemovedFaces:
         return bool(neighbours.all()) and not self._passes_twice(points)
 
     def _near_both(self, ends: SurfacePoints) -> SurfacePoints:
-        """The ends of a segment in one face on which both lie; empty if there is none."""
+        """The ends of a segment in one face on which both lie; empty if no face has both."""
         positions = ends.positions(self._mesh)
         most = max(tolerances.GAP * self._mesh.diagonal, tolerances.rounding(positions))
         used = self._faces[ends.faces][ends.barycentric > 0.0]

@@ -67,7 +67,7 @@ WITHIN = 0.99
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 6, 4
+MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 4, 2
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
 are designed without a start in each part of the third one; fewer in its last part."""
 
@@ -86,12 +86,8 @@ class Line(NamedTuple):
     control_index: IntArray
 
 
-Curves = Callable[[SurfacePoints, Line | None, bool], tuple[SurfaceCurve | None, bool]]
-"""Designs the curve through control points, and tells whether the design is complete.
-
-If the last argument is True, the curve is relaxed from the line, if there is a curve along it.
-Otherwise the design is incomplete if it has ended with a curve that has less energy than the one
-along the line and takes another course; without a line it is always complete.
+Curves = Callable[[SurfacePoints, Line | None], SurfaceCurve | None]
+"""Designs the curve through control points, or relaxes it from a line if there is a curve along it.
 """
 
 
@@ -152,7 +148,7 @@ def fitted_points(
         In mesh units.
     closed : bool
     design : callable
-        Designs the curve through control points; see `Curves`.
+        Designs the curve through control points, or relaxes it from a line; see `Curves`.
 
     Raises
     ------
@@ -226,7 +222,8 @@ class _Fit:
             curve = None
             # Two of the points may coincide, or lie on different parts.
             with contextlib.suppress(ControlPointError, UnreachableError, CurveError):
-                curve = self._curve(knots, along)
+                line = Line(self.places, knots) if along else None
+                curve = self.design(self.points(knots), line)
             missing = np.arange(0) if curve is None else self.missing(knots, curve)
             if curve is not None and not len(missing):
                 return knots
@@ -239,14 +236,6 @@ class _Fit:
                 return None
             knots = finer
         return None
-
-    def _curve(self, knots: IntArray, along: bool) -> SurfaceCurve | None:
-        """The curve through knots. If it stays near the stroke, its design is complete."""
-        points = self.points(knots)
-        curve, complete = self.design(points, Line(self.places, knots), along)
-        if curve is not None and not complete and not len(self.missing(knots, curve)):
-            curve, _ = self.design(points, None, along)
-        return curve
 
     def close(self, knots: IntArray) -> IntArray:
         """Knots, with others added beside those where lines between them turn much.

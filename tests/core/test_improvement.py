@@ -1,7 +1,5 @@
 """Tests that further attempts at a curve never make it worse."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points, snapped
 from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import random_surface_points
 from tests.oracles.energies import named_requests
 
@@ -31,31 +28,6 @@ def test_more_attempts_do_not_raise_the_energy(monkeypatch, name):
     surface = curve_surface(first.mesh)
     one, all_of_them = energies_of(surface, [first.curve, every.curve], 1.0, first.curve.length)
     assert all_of_them <= one * (1.0 + 1e-9)
-
-
-def test_no_attempt_follows_when_a_rival_is_beaten(monkeypatch):
-    asked = REQUESTS[BENT[0]]
-    design = nicmm.Designer(asked.mesh).design(asked.points, **asked.options, alternatives=1)
-    best, worse = design.resumable, design.alternatives[0].resumable
-    attempts = []
-    attempt = improvement.Improvement.attempt
-
-    def spy(self, start, config):
-        attempt(self, start, config)
-        attempts.append(self.energies[-1])
-
-    monkeypatch.setattr(improvement.Improvement, "attempt", spy)
-    numbers = []
-    for rival in (None, best, worse):
-        attempts.clear()
-        request = dataclasses.replace(best.request, alternatives=0)
-        found = SurfaceDesigner(best.mesh).design(request, 0.0, rival=rival)
-        numbers.append(len(attempts))
-        if rival is not worse:
-            np.testing.assert_array_equal(
-                found.resumable.curve.nodes.positions, best.curve.nodes.positions
-            )
-    assert numbers[0] == numbers[1] > numbers[2]
 
 
 @pytest.mark.slow
