@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -45,11 +46,22 @@ def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
     failed = []
     for name, folder, command in checks:
         say(name)
-        if run([VENV_PYTHON, "-m", *command], ONE_THREAD, folder) != 0:
+        if not _passes(command, folder):
             failed.append(name)
     if failed:
         say(f"Failed: {', '.join(failed)}")
     return 1 if failed else 0
+
+
+def _passes(command: Sequence[str | Path], folder: Path) -> bool:
+    """Run a check; where a test process has crashed, its stack then stands at the end."""
+    with tempfile.TemporaryFile() as errors:
+        passed = run([VENV_PYTHON, "-m", *command], ONE_THREAD, folder, errors) == 0
+        errors.seek(0)
+        for line in errors.read().decode("utf-8", "replace").splitlines():
+            if not line.startswith("Extension modules:"):
+                print(line, flush=True)
+    return passed
 
 
 def _pytest_commands(

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = ROOT / "kernels"
@@ -37,13 +38,20 @@ def say(text: str) -> None:
 
 
 def run(
-    arguments: Sequence[str | Path], environment: dict[str, str] | None = None, folder: Path = ROOT
+    arguments: Sequence[str | Path],
+    environment: dict[str, str] | None = None,
+    folder: Path = ROOT,
+    errors: IO[bytes] | None = None,
 ) -> int:
-    """Run a command in a folder, show its output and return its exit status."""
+    """Run a command in a folder, show its output and return its exit status.
+
+    What it writes to its standard error is shown too, or goes to a file.
+    """
     return subprocess.run(
         [str(argument) for argument in arguments],
         cwd=folder,
         env={**os.environ, **(environment or {})},
+        stderr=errors,
         check=False,
     ).returncode
 

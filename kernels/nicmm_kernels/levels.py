@@ -404,7 +404,7 @@ class CurveRelaxation:
             self._make_room(n, 2 * points, steps.more_room(self._pair_room, n))
         kernel.check(code)
         found = self._buffers.pop(1)
-        found.curve = curves.next
+        found.curve = _Curve.from_buffer_copy(curves.next)  # not a view that keeps all former ones
         self._buffers.insert(0, found)
 
     def _make_room(self, n: int, points: int, pair_room: int) -> None:
