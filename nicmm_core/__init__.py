@@ -9,13 +9,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .design import Designer as Designer
     from .design import design_curve as design_curve
     from .design import feature_loop as feature_loop
     from .design import fit_stroke as fit_stroke
     from .design import mirrored as mirrored
     from .design import offset_curve as offset_curve
     from .design_result import Design as Design
+    from .designer import Designer as Designer
     from .errors import ArgumentError as ArgumentError
     from .errors import ControlPointError as ControlPointError
     from .errors import CurveError as CurveError
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "design": (
-        "Designer",
         "design_curve",
         "feature_loop",
         "fit_stroke",
@@ -60,6 +59,7 @@ _NAMES = {
         "offset_curve",
     ),
     "design_result": ("Design",),
+    "designer": ("Designer",),
     "errors": (
         "ArgumentError",
         "ControlPointError",

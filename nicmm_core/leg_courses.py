@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from .courses.comparison import SAME_COURSE, farthest_between
-from .design import Designer
 from .design_result import Design, cancelled_design
+from .designer import Designer
 from .errors import CurveError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve, points_of_leg, resample, with_other_leg

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ..design import Designer
+from ..designer import Designer
 from ..errors import ArgumentError
 from ..io.files import check_curve_path, read_curve, read_mesh, write_curve
 from .paths import add_curve, add_mesh, add_output, numbered

@@ -12,7 +12,7 @@ from nicmm_core.courses.course_surface import (
     edges_crossed,
 )
 from nicmm_core.courses.hop_graph import SEARCH_CELLS
-from nicmm_core.design import Designer
+from nicmm_core.designer import Designer
 from nicmm_core.mapped_surface import MappedSurface
 from nicmm_core.maps.guidance import feature_map
 from nicmm_core.relaxation import curve_nodes
