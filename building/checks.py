@@ -22,11 +22,11 @@ from .environment import (
 )
 from .extension import stage
 
-WITH_BLENDER = ("tests/blender", "tests/benchmarks")
-"""Folders of the tests that import Blender's module; the benchmarks render with it.
+APART = ("tests/blender", "tests/benchmarks", "tests/core/paper")
+"""Folders of the tests that import Blender's module or PyTorch; the benchmarks render with Blender.
 
-Processes that had imported it have crashed after about a thousand of the other tests, which pass
-without it. The cause is not known.
+Processes that had imported these libraries have crashed after about a thousand of the other tests,
+which pass without them. The cause is not known.
 """
 
 
@@ -69,17 +69,17 @@ def _pytest_commands(
 ) -> Iterator[tuple[str, Sequence[str | Path]]]:
     """Names and arguments of the runs of pytest.
 
-    Each folder whose tests import Blender's module has processes of its own, and the other tests
-    run without it, as users of the package do.
+    Each folder whose tests import Blender's module or PyTorch has processes of its own, and the
+    other tests run without them, as users of the package do.
     """
     command = ["pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"]
     command += ["-m", "not slow"] if quick else []
     if given:
         yield "pytest", [*command, *given]
         return
-    for folder in WITH_BLENDER:
+    for folder in APART:
         yield f"pytest of {folder}", [*command, folder]
-    yield "pytest of the others", [*command, *(f"--ignore={path}" for path in WITH_BLENDER)]
+    yield "pytest of the others", [*command, *(f"--ignore={path}" for path in APART)]
 
 
 def run_sanitized(arguments: Sequence[str]) -> int:
