@@ -45,7 +45,7 @@ BENT = 15.0
 STRONGLY_BENT = 20.0
 """L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
 
-WITH_NORMAL_BENDING = 8.0
+WITH_NORMAL_BENDING = 14.0
 """Increase of these three bounds, relative to them, for each unit of `normal_bending`.
 
 The fairest curve then bends more along the surface in order to bend less with it.
