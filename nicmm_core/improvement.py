@@ -51,6 +51,12 @@ WITH_NORMAL_BENDING = 14.0
 The fairest curve then bends more along the surface in order to bend less with it.
 """
 
+LIKE_CIRCLE = 35.0
+"""L ∮ κ_g² ds above which the search is repeated once in any case.
+
+A loop beside a limb bends at least like a circle; a ring around the limb may be fairer.
+"""
+
 WITH_AVOIDED_CURVES = 2.5
 """Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
 
@@ -342,7 +348,9 @@ class Improvement:
         The first repeated search is worthwhile if the best curve bends; those after it, only if it
         is still strongly bent and two searches have not found the same curve.
         """
-        least = self._bound(SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT)
+        least = self._bound(STRONGLY_BENT)
+        if self.searches == 1:
+            least = min(self._bound(SLIGHTLY_BENT), LIKE_CIRCLE)
         found_twice = self.repeat_found_same_curve or self.spline_found_same_curve
         promising = self._bending > least and not found_twice
         return promising and self._is_affordable(self._work / self.searches + self._reserved)
