@@ -103,3 +103,19 @@ def test_the_spline_through_many_points_is_tried(ball, monkeypatch):
     for count in (4, start_search.FEWEST_FOR_SPLINE):
         nicmm.design_curve(ball, random_surface_points(ball, count, 1), order="shortest")
     assert tried == [start_search.FEWEST_FOR_SPLINE]
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_a_curve_that_bends_like_a_circle_is_searched_for_again(flat_disc, monkeypatch, weight):
+    """Although curves with normal bending may bend more along the surface."""
+    seeds = []
+    courses = start_search.StartSearch.courses
+
+    def spy(search, request, seed=0, *given, **named):
+        seeds.append(seed)  # when the first course is asked for
+        yield from courses(search, request, seed, *given, **named)
+
+    monkeypatch.setattr(start_search.StartSearch, "courses", spy)
+    square = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.0, -0.5, 0.0]]
+    nicmm.design_curve(flat_disc, square, normal_bending=weight)
+    assert seeds[:2] == [0, 1]
