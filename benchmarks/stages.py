@@ -16,7 +16,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import (
-    design,
+    designer,
     mapped_surface,
     repaired_surface,
     shapes,
@@ -46,9 +46,9 @@ POINTS = 4
 
 STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "checks, clean surface, manifold": [
-        (design, "checked_options"),
-        (design, "locate_control_points"),
-        (design, "clean_surfaces"),
+        (designer, "checked_options"),
+        (designer, "locate_control_points"),
+        (designer, "clean_surfaces"),
         (repaired_surface, "manifold"),
     ],
     "canonical copy": [
