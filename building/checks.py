@@ -25,8 +25,8 @@ from .extension import stage
 APART = ("tests/blender", "tests/benchmarks", "tests/core/paper")
 """Folders of the tests that import Blender's module or PyTorch; the benchmarks render with Blender.
 
-Processes that had imported these libraries have crashed after about a thousand of the other tests,
-which pass without them. The cause is not known.
+Processes have crashed, rarely, after about a thousand tests. All of them had imported PyTorch, and
+most of them Blender's module. The cause is not known.
 """
 
 

@@ -51,14 +51,14 @@ WITH_NORMAL_BENDING = 14.0
 The fairest curve then bends more along the surface in order to bend less with it.
 """
 
-LIKE_CIRCLE = 35.0
-"""L ∮ κ_g² ds above which the search is repeated once in any case.
-
-A loop beside a limb bends at least like a circle; a ring around the limb may be fairer.
-"""
-
 WITH_AVOIDED_CURVES = 2.5
 """Factor of these three bounds if other curves are avoided; the fairest curve goes round them."""
+
+LIKE_CIRCLE = 35.0
+"""L ∮ κ_g² ds above which the search is repeated once in any case, somewhat less than for a circle.
+
+With normal bending, a loop beside a limb may be found first, and a ring around it be fairer.
+"""
 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""

@@ -14,7 +14,7 @@ SHORTEST, WORDS = 12, 6
 # Modules of the core with messages about a request, a start or an argument.
 CORE = (
     "arguments.py",
-    "design.py",
+    "designer.py",
     "repaired_surface.py",
     "start.py",
     "repair/free_surface.py",
