@@ -44,6 +44,7 @@ MEASUREMENTS = (
     "search_effort",
     "portfolio",
     "courses",
+    "dense_points",
     "course_pictures",
     "prompts",
     "symmetry",

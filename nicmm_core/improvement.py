@@ -2,9 +2,9 @@
 
 The farther a curve winds around limbs, the more courses a search misses. So the search is repeated,
 with other lengths and another tension, if the curve bends, and more often if even the best curve
-bends strongly. Then the parts that bend most are searched for again. If the best curve has kinks,
-the initial path is tried before these searches, and more tension after them. At last come courses
-for alternatives.
+bends strongly. Then, or before if there are many control points, the parts that bend most are
+searched for again. If the best curve has kinks, the initial path is tried before these searches,
+and more tension after them. At last come courses for alternatives.
 """
 
 from __future__ import annotations
@@ -72,9 +72,15 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-SEARCHES_FOR_PARTS, OF_MANY_POINTS = 6, 2
+SEARCHES_FOR_PARTS, OF_MANY_POINTS = 6, 8
 """Greatest number of searches for parts of the best curve; and the same through so many control
-points that the spline is tried, where further ones gained nothing."""
+points that the spline is tried."""
+
+DENSE_POINTS = 12
+"""Number of control points from which parts are searched for before the whole curve again.
+
+Most legs are then right, and hardly any search for the whole curve finds all of them at once.
+"""
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
 """Greatest numbers of courses looked at after each of them, and of those relaxed."""
@@ -166,13 +172,14 @@ class Improvement:
         courses : iterator of InitialCurve
             Other courses of the first search. Those that remain are for alternatives.
         start_kind : StartKind
-            What the first start is. After a spline that bends hardly more than its control points
-            require, there are no searches. If no course was simple, further searches would hardly
-            find one and take long, so they are made only for alternatives.
+            What the first start is. If control points are close together and the spline bends
+            hardly more than they require, there are no searches. If no course was simple, further
+            searches for the whole curve would hardly find one and take long, so they are made only
+            for alternatives.
         """
         request, self.path_tried = self.request, start_kind is StartKind.PATH
         further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
-        if start_kind is not StartKind.SPLINE or not bends_like_points(self.curves[0]):
+        if start_kind is not StartKind.CLOSE_POINTS or not bends_like_points(self.curves[0]):
             self._search_further(courses, further, start_kind)
         if self._should_tighten():
             self.attempt(self.starts[self.best], self._limited(TIGHTENED))
@@ -190,22 +197,26 @@ class Improvement:
         start_kind: StartKind,
     ) -> None:
         """Try the spline, courses of the first search and of further ones, and other parts."""
-        if start_kind is StartKind.SPLINE:
+        if start_kind is StartKind.CLOSE_POINTS:
             self.searches = 0
             by_course = self._try_courses(courses)
             self.spline_found_same_curve = self.repeat_found_same_curve
         else:
             by_course = start_kind is StartKind.COURSE
-            if has_many_points(self.request):
+            if has_many_points(self.request) and start_kind is not StartKind.SPLINE:
                 self._try_spline()
             if by_course:
                 self._try_other_courses(courses)
         self._try_path()
+        is_dense = len(self.request.points) >= DENSE_POINTS
+        if is_dense:
+            self._try_other_parts()
         if by_course:
             for repeated in further:
                 if not (self._should_search_again() and self._try_courses(repeated)):
                     break
-        self._try_other_parts()
+        if not is_dense:
+            self._try_other_parts()
 
     @property
     def _config(self) -> RelaxationConfig:
@@ -276,12 +287,11 @@ class Improvement:
             before, curve = len(self.starts), self.curves[changed]
             self.parts += 1
             courses = self.search.with_other_part(self.request, self.starts[changed], curve, part)
-            promising = (
-                start
-                for start in itertools.islice(courses, COURSES_OF_A_PART)
-                if isinstance(start.curve, DiscreteCurve) and self._is_promising(start.curve)
-            )
-            for start in itertools.islice(promising, RELAXED_OF_A_PART):
+            starts = list(itertools.islice(courses, COURSES_OF_A_PART))
+            promising = [start for start in starts if self._is_promising(start)]
+            if not promising and has_many_points(self.request):
+                promising = starts[:1]  # it may only be kinked where it meets the other parts
+            for start in promising[:RELAXED_OF_A_PART]:
                 self.attempt(start, self._limited(WARM))
             if self._gained_since(before):
                 changed = self.best
@@ -320,12 +330,12 @@ class Improvement:
     def _surface(self) -> CurveSurface:
         return self.starts[0].surface
 
-    def _is_promising(self, start: DiscreteCurve) -> bool:
+    def _is_promising(self, start: InitialCurve) -> bool:
         """Whether a start, if relaxed, may become better than the best curve."""
-        best = self.curves[self.best]
-        scale = self.curves[0].length
-        least, energy = energies_of(self._surface, [best, start], self.request.smoothness, scale)
-        return energy - least <= PROMISING * self._elastic_energy(best)
+        assert isinstance(start.curve, DiscreteCurve)
+        curves, scale = [self.curves[self.best], start.curve], self.curves[0].length
+        least, energy = energies_of(self._surface, curves, self.request.smoothness, scale)
+        return energy - least <= PROMISING * self._elastic_energy(curves[0])
 
     def _gained_since(self, before: int) -> bool:
         """Whether the results from an index on are clearly better than those before."""
@@ -364,7 +374,7 @@ class Improvement:
 
     def _should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
-        promising = self._bending > self._bound(BENT) and not self.spline_found_same_curve
+        promising = self._bending > self._bound(BENT)
         return promising and self._is_affordable(WORK_OF_PART + self._reserved)
 
     def _should_tighten(self) -> bool:

@@ -38,6 +38,10 @@ MOST_FAILURES = 4
 On rough meshes each of them takes long.
 """
 
+PARTS_APART = 0.005
+"""Distance between two courses of a part, relative to the diagonal of the mesh, below which they
+are the same; less than between whole courses, since a part may lead around a finger.
+"""
 
 FEWEST_FOR_SPLINE = 6
 """Least number of control points for which the spline through them is tried.
@@ -50,6 +54,7 @@ class StartKind(Enum):
     """What a curve begins with."""
 
     COURSE = "course of a search"
+    CLOSE_POINTS = "spline through close control points"
     SPLINE = "spline through control points"
     PATH = "initial path"
 
@@ -122,7 +127,7 @@ class StartSearch:
             if start is not None:
                 assert isinstance(start.curve, DiscreteCurve)
                 if has_short_legs(start.curve):
-                    return start, StartKind.SPLINE
+                    return start, StartKind.CLOSE_POINTS
         start = next(courses, None)
         if start is not None:
             return start, StartKind.COURSE
@@ -172,7 +177,7 @@ class StartSearch:
         for course in self.courses(part_request, search_size=PART):
             assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
-            if changed is not None and is_apart(start.surface, changed, known):
+            if changed is not None and is_apart(start.surface, changed, known, PARTS_APART):
                 known.append(changed)
                 yield replace(start, curve=changed)
 

@@ -31,9 +31,14 @@ def distinct_by_energy(
     return chosen
 
 
-def is_apart(surface: CurveSurface, curve: DiscreteCurve, others: Sequence[DiscreteCurve]) -> bool:
-    """Whether a curve is somewhere apart from each of the others."""
-    limit = SAME_COURSE * surface.mesh.diagonal
+def is_apart(
+    surface: CurveSurface,
+    curve: DiscreteCurve,
+    others: Sequence[DiscreteCurve],
+    distance: float = SAME_COURSE,
+) -> bool:
+    """Whether a curve is somewhere apart from each of the others, by a share of the diagonal."""
+    limit = distance * surface.mesh.diagonal
     positions = curve.nodes.positions
     return all(farthest_between(positions, other.nodes.positions) > limit for other in others)
 

@@ -18,7 +18,7 @@ from ..geometry.crossings import meeting_segments
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
-from ..relaxation.batch_relaxation import BatchConfig, relax_batch
+from ..relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.even_nodes import resampled
 from ..relaxation.node_traces import (
@@ -88,6 +88,11 @@ class LegCurves:
     def traces(self) -> NodeTraces:
         """Traces between the nodes."""
         return traces_between_nodes(self.surface, self.nodes)
+
+    def only(self, which: IntArray) -> LegCurves:
+        """Some of the curves, by their indices, which are sorted by leg."""
+        nodes = curves_of(self.nodes, which)
+        return LegCurves(self.surface, nodes, self.leg[which], self.ends[which], self.n_legs)
 
     def of_leg(self, leg: int) -> slice:
         """The curves of one leg."""
@@ -287,8 +292,7 @@ def distinct_combinations(
     """
     offset = np.cumsum([0] + [len(pairs) for pairs in alike])[:-1]
     choice = combinations.choice - offset
-    limit = OF_MANY_LEGS if len(alike) >= MANY_LEGS else MAX_RELATIVE_COST
-    left = combinations.cost <= limit * combinations.cost.min(initial=np.inf)
+    left = combinations.cost <= most_cost(len(alike), combinations.cost)
     chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())
@@ -298,6 +302,12 @@ def distinct_combinations(
             same &= pairs[choice[best, leg]][choice[:, leg]]
         left &= ~same
     return Combinations(combinations.choice[chosen], combinations.cost[chosen])
+
+
+def most_cost(n_legs: int, costs: FloatArray) -> float:
+    """The cost up to which combinations of legs are relaxed, given their costs."""
+    limit = OF_MANY_LEGS if n_legs >= MANY_LEGS else MAX_RELATIVE_COST
+    return limit * float(costs.min(initial=np.inf))
 
 
 def steps_of_course(n_legs: int) -> int:

@@ -8,6 +8,7 @@ relaxed legs.
 
 from __future__ import annotations
 
+import nicmm_kernels
 import numpy as np
 
 from ..geometry import tolerances
@@ -22,12 +23,11 @@ from ..relaxation.node_traces import places_along, traces_between_nodes
 from .comparison import SAME_COURSE
 from .hop_graph import tangents
 from .leg_combinations import (
-    Combinations,
     LegCurves,
     cheapest_combinations,
     course_nodes,
     crossing_legs,
-    distinct_combinations,
+    most_cost,
 )
 from .leg_orders import legs_of_order
 
@@ -94,18 +94,21 @@ def recombined(
         legs_of_order(wanted, nodes.closed)[leg],
         int(leg[-1]) + 1,
     )
-    legs = [curves.of_leg(number) for number in range(curves.n_legs)]
     terms = comparable_terms(surface, nodes, smoothness, scale)
     cost = _costs(nodes, terms, course, begin, end, leg)
+    distinct, alike = _distinct_legs(curves, cost, SAME_COURSE * surface.mesh.diagonal)
+    known = np.full((len(kept), curves.n_legs), -1)
+    known[course, leg] = alike
+    curves, cost = curves.only(distinct), cost[distinct]
+    legs = [curves.of_leg(number) for number in range(curves.n_legs)]
     corners = np.unique(visit[nodes.by_curve(nodes.corners)]) if nodes.corners is not None else []
     turns = _turning_costs(curves.nodes, legs, np.isin(wanted, corners), nodes.closed, scale)
     found = cheapest_combinations(
         [cost[each] for each in legs], turns, crossing_legs(curves), nodes.closed
     )
-    new = (course[found.choice] != course[found.choice[:, :1]]).any(axis=1)
-    found = Combinations(found.choice[new], found.cost[new])
-    alike = [_alike(curves.nodes, each, SAME_COURSE * surface.mesh.diagonal) for each in legs]
-    choice = distinct_combinations(alike, found, most).choice
+    is_new = ~(found.choice[:, None] == known).all(axis=2).any(axis=1)
+    choice, costs = found.choice[is_new], found.cost[is_new]
+    choice = choice[costs <= most_cost(curves.n_legs, costs)][:most]
     if not len(choice):
         return None
     steps = size if nodes.closed else size - 1
@@ -248,10 +251,26 @@ def _turning_costs(
     return costs
 
 
-def _alike(legs: Nodes, of_leg: slice, limit: float) -> BoolArray:
-    """Pairs of curves of one leg whose nodes are nowhere farther apart than a limit."""
-    positions = legs.positions.reshape(-1, legs.per_curve, 3)[of_leg]
-    apart = (positions[:, None] - positions).reshape(-1, 3).T
-    farthest = lengths(apart).reshape(len(positions), len(positions), -1).max(axis=2)
-    result: BoolArray = farthest <= limit
-    return result
+def _distinct_legs(curves: LegCurves, cost: FloatArray, limit: float) -> tuple[IntArray, IntArray]:
+    """The cheapest of the curves of each leg that run beside each other.
+
+    Returns
+    -------
+    (d,) int array
+        Their indices, sorted by leg.
+    (r,) int array
+        For each curve, the number of the one among them beside which it runs.
+    """
+    positions = np.ascontiguousarray(curves.nodes.positions).reshape(len(cost), -1, 3)
+    found: list[int] = []
+    alike = np.zeros(len(cost), dtype=np.int64)
+    for number in range(curves.n_legs):
+        own = curves.of_leg(number)
+        chosen = nicmm_kernels.distinct_curves(
+            positions[own], np.argsort(cost[own], kind="stable"), limit, checkpoint
+        )
+        apart = (positions[own, None] - positions[own][chosen]).reshape(-1, 3).T
+        farthest = lengths(apart).reshape(own.stop - own.start, len(chosen), -1).max(axis=2)
+        alike[own] = len(found) + farthest.argmin(axis=1)
+        found.extend((own.start + chosen).tolist())
+    return np.array(found), alike

@@ -16,10 +16,10 @@ from .discrete_curve import DiscreteCurve
 GREATEST_TURN = 1.0
 """Greatest of the `turns` of close points, except at corners, in radians."""
 
-LONGEST_LEG = 1.5
+LONGEST_LEG = 1.25
 """Greatest length of a leg, relative to the distance between its ends in space."""
 
-MORE_BENDING, FURTHER_BENDING = 1.5, 10.0
+MORE_BENDING, FURTHER_BENDING = 1.5, 5.0
 """Greatest L ∮ κ_g² ds, relative to that of the lines between close points, and added to this."""
 
 
