@@ -1,10 +1,12 @@
 """Tests that further attempts at a curve never make it worse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import improvement, start_search
+from nicmm_core import improvement, shapes, start_search
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points, snapped
 from nicmm_core.relaxation.curve_energies import energies_of
@@ -28,6 +30,28 @@ def test_more_attempts_do_not_raise_the_energy(monkeypatch, name):
     surface = curve_surface(first.mesh)
     one, all_of_them = energies_of(surface, [first.curve, every.curve], 1.0, first.curve.length)
     assert all_of_them <= one * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "vertices", "count"),
+    [(0, [100, 357, 918, 1403, 479], 14), (1, [40, 500, 900, 1300], 12), (2, [7, 300, 800], 18)],
+)
+def test_a_curve_through_many_points_of_a_fair_curve_is_as_fair(seed, vertices, count):
+    """On the first body, one leg led along the wrong side of a limb before parts came first."""
+    body = shapes.creature(seed, resolution=32, faces=200)
+    designer = nicmm.Designer(body)
+    curve = designer.design(vertices, order="shortest").curves[0]
+    n = len(curve.faces)
+    places = np.linspace(0, n, count, endpoint=False)
+    places += np.random.default_rng([23, 40, count]).uniform(-0.25, 0.25, count) * n / count
+    at = np.unique(places.round().clip(0, n - 1).astype(int))
+    points = nicmm.SurfacePoints(curve.faces[at], curve.barycentric[at])
+    given = replace(curve, control_index=at)
+    found, kept = (designer.design(points, start=start).resumable for start in (None, given))
+    surface = curve_surface(found.mesh)
+    new, old = energies_of(surface, [found.curve, kept.curve], 1.0, kept.curve.length)
+    assert new <= 1.02 * old
 
 
 @pytest.mark.slow
