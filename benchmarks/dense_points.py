@@ -119,5 +119,6 @@ def summary(results: Results) -> str:
     return report.item(
         f"Through {COUNTS[0]} to {COUNTS[-1]} points that lie on a fair curve, another course is "
         f"sometimes taken: the energy is more than {100 * (FAR_WORSE - 1):.0f} % above that of "
-        f"the given curve for {report.listed(parts)}"
+        f"the given curve for {' and '.join(parts)} "
+        "([measured](../benchmarks/RESULTS.md#many-control-points))."
     )
