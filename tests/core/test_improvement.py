@@ -38,7 +38,7 @@ def test_more_attempts_do_not_raise_the_energy(monkeypatch, name):
     [(0, [100, 357, 918, 1403, 479], 14), (1, [40, 500, 900, 1300], 12), (2, [7, 300, 800], 18)],
 )
 def test_a_curve_through_many_points_of_a_fair_curve_is_as_fair(seed, vertices, count):
-    """On the first body, one leg led along the wrong side of a limb before parts came first."""
+    """On the first body the spline and the search agree on a leg on the wrong side of a limb."""
     body = shapes.creature(seed, resolution=32, faces=200)
     designer = nicmm.Designer(body)
     curve = designer.design(vertices, order="shortest").curves[0]

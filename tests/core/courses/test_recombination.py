@@ -73,6 +73,14 @@ def test_new_courses_pass_the_points_in_the_order_of_the_best_course(closed):
         np.testing.assert_allclose(positions[:, :2], CONTROLS, atol=STRICTLY_INSIDE)
 
 
+def test_courses_that_run_beside_each_other_are_not_combined():
+    """Their combinations would run beside both of them."""
+    bulges = np.zeros((2, 4))
+    bulges[0, 0] = bulges[1, 2] = 0.02
+    surface, nodes, visit = courses(True, bulges)
+    assert recombined(surface, nodes, visit, np.ones(nodes.curves, bool), 1.0, 4) is None
+
+
 def test_two_points_leave_nothing_to_combine():
     mesh = grid(10)
     surface = curve_surface(mesh)
