@@ -137,11 +137,11 @@ def _random_weights(generator: np.random.Generator) -> Iterator[None]:
     build = course_search.with_control_points
 
     def with_weights(  # type: ignore[no-untyped-def]
-        graph, points, corners, along, legs, factor, tension, normal_bending
+        graph, points, corners, length, factor, tension, normal_bending
     ):
         weights = np.exp(WEIGHTS * generator.standard_normal(len(graph.surface.mesh.vertices)))
         factor = weights if factor is None else factor * weights
-        return build(graph, points, corners, along, legs, factor, tension, normal_bending)
+        return build(graph, points, corners, length, factor, tension, normal_bending)
 
     with (
         mock.patch.object(course_search, "with_control_points", with_weights),

@@ -8,12 +8,8 @@ Python. While it computes, other threads of Python run.
 
 from .crossings import meeting_segments, polyline_crossings
 from .distinct_curves import distinct_curves
-from .edge_paths import (
-    EdgeGraphArrays,
-    distances_along_edges,
-    nearest_cells,
-    points_on_edge_paths,
-)
+from .edge_paths import EdgeGraphArrays, distances_along_edges, points_on_edge_paths
+from .hops import FoundHops, HopPlaces, surface_hops
 from .least_sums import least_sums
 from .legs import PathArrays, best_legs, cell_sets, distinct_routes
 from .level_refinement import LevelLimits, PartArrays, refine_at_level
@@ -55,6 +51,8 @@ __all__ = [
     "CurveRelaxation",
     "EdgeGraphArrays",
     "EnergyRules",
+    "FoundHops",
+    "HopPlaces",
     "KernelError",
     "LevelLimits",
     "LevelOutcome",
@@ -91,7 +89,6 @@ __all__ = [
     "find_contacts",
     "least_sums",
     "meeting_segments",
-    "nearest_cells",
     "nearest_places",
     "place_nodes",
     "place_on_polyline",
@@ -103,6 +100,7 @@ __all__ = [
     "remove_crossings",
     "reordered",
     "segment_ends",
+    "surface_hops",
     "trace_between",
     "trace_from",
     "trace_polyline",

@@ -25,7 +25,9 @@ from .library import (
 from .traces import MeshArrays, MeshPointers
 
 
-class _EdgeGraph(ctypes.Structure):
+class EdgeGraphPointers(ctypes.Structure):
+    """Pointers to the arrays of a graph."""
+
     _fields_ = [
         ("vertex_count", COUNT),
         ("arc_count", COUNT),
@@ -33,18 +35,6 @@ class _EdgeGraph(ctypes.Structure):
         ("ends", POINTER),
         ("faces", POINTER),
         ("lengths", POINTER),
-    ]
-
-
-class _NearestCells(ctypes.Structure):
-    _fields_ = [
-        ("n", COUNT),
-        ("most", COUNT),
-        ("longest", NUMBER),
-        ("vertices", POINTER),
-        ("counts", POINTER),
-        ("cells", POINTER),
-        ("distances", POINTER),
     ]
 
 
@@ -60,14 +50,15 @@ class _EdgePoints(ctypes.Structure):
     ]
 
 
-_RESUMED = (POINTER, COUNT, COUNT, ctypes.POINTER(COUNT))
-_EDGE_GRAPH = Kernel("edge_graph", MeshPointers, _EdgeGraph, POINTER)
+RESUMED = (POINTER, COUNT, COUNT, ctypes.POINTER(COUNT))
+_EDGE_GRAPH = Kernel("edge_graph", MeshPointers, EdgeGraphPointers, POINTER)
 _SEARCH_ITEMS = Kernel("edge_search_items", COUNT)
 _DISTANCES = Kernel(
-    "distances_along_edges", _EdgeGraph, COUNT, POINTER, POINTER, *_RESUMED, POINTER
+    "distances_along_edges", EdgeGraphPointers, COUNT, POINTER, POINTER, *RESUMED, POINTER
 )
-_NEAREST_CELLS = Kernel("nearest_cells", _EdgeGraph, _NearestCells, *_RESUMED)
-_POINTS_ON_PATHS = Kernel("points_on_edge_paths", MeshPointers, _EdgeGraph, _EdgePoints, *_RESUMED)
+_POINTS_ON_PATHS = Kernel(
+    "points_on_edge_paths", MeshPointers, EdgeGraphPointers, _EdgePoints, *RESUMED
+)
 
 
 class EdgeGraphArrays:
@@ -83,7 +74,7 @@ class EdgeGraphArrays:
         v, room = mesh.vertex_count, 6 * mesh.face_count
         begins, ends, faces = (np.empty(size, dtype=np.int64) for size in (v + 1, room, room))
         lengths, last_seen = np.empty(room), np.empty(v, dtype=np.int64)
-        self.pointers = _EdgeGraph(
+        self.pointers = EdgeGraphPointers(
             v, room, begins.ctypes.data, ends.ctypes.data, faces.ctypes.data, lengths.ctypes.data
         )
         self._arrays = (begins, ends, faces, lengths)
@@ -127,49 +118,6 @@ def distances_along_edges(
     after = (distances.ctypes.data,)
     in_several_calls(_DISTANCES, k, before, graph.scratch(), meanwhile, after)
     return distances
-
-
-def nearest_cells(
-    graph: EdgeGraphArrays,
-    vertices: IntArray,
-    most: int,
-    longest: float,
-    meanwhile: Callable[[], object],
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """The nearest cells of n cells along edges.
-
-    Of several cells at the same distance, that of the lowest index is nearer.
-
-    Parameters
-    ----------
-    graph : EdgeGraphArrays
-    vertices : (n,) int array
-        Vertices that are the cells, ascending.
-    most : int
-        Number of cells that are wanted around each cell.
-    longest : float
-        Distance up to which they are searched for, in mesh units.
-    meanwhile : callable
-        Called between two calls of the kernel, at least after every `MOST_WORK` arcs.
-
-    Returns
-    -------
-    one, other : (p,) int arrays
-        Each cell, ascending, and its nearest cells by distance.
-    (p,) float array
-        Their distances.
-    """
-    n = rows("vertices", vertices)
-    counts, cells = np.zeros(n, dtype=np.int64), np.zeros((n, most), dtype=np.int64)
-    distances = np.zeros((n, most))
-    nearest = _NearestCells(
-        n, most, longest, address("vertices", vertices, INT, n), counts.ctypes.data,
-        cells.ctypes.data, distances.ctypes.data,
-    )  # fmt: skip
-    scratch = np.empty(len(graph.scratch()) + graph.vertex_count)
-    in_several_calls(_NEAREST_CELLS, n, (graph.pointers, nearest), scratch, meanwhile)
-    found = np.arange(most) < counts[:, None]
-    return np.arange(n).repeat(counts), cells[found], distances[found]
 
 
 def points_on_edge_paths(

@@ -2,18 +2,8 @@
 
    Of several paths of the same length, the one whose last vertex but one comes first counts: that
    at the smaller distance, or of the lower index. */
-#include "mesh.h"
-#include "queue.h"
+#include "edge_paths.h"
 #include "vectors.h"
-
-/* The arcs from every vertex to its neighbours. */
-typedef struct {
-    int64_t vertex_count, arc_count;
-    int64_t *begins; /* (V + 1) index of the first arc of each vertex; and the number of arcs */
-    int64_t *ends;   /* (arc_count) vertices */
-    int64_t *faces;  /* (arc_count) the first face that has the edge */
-    double *lengths; /* (arc_count) */
-} EdgeGraph;
 
 static int add_arc(const EdgeGraph *graph, int64_t start, int64_t end, int64_t face,
                    int64_t *places)
@@ -71,23 +61,12 @@ EXPORTED int edge_graph(const Mesh *mesh, EdgeGraph *graph, int64_t *last_seen)
     return OK;
 }
 
-/* A search for paths from one place. All arrays are as new between two searches. */
-typedef struct {
-    double *distances; /* (V) least lengths of paths found so far */
-    int64_t *previous; /* (V) the vertex before each vertex on its path, -1 if it is the first */
-    int64_t *arcs;     /* (V) the arc from there */
-    int64_t *reached;  /* (V) vertices with a distance */
-    int64_t reached_count;
-    Queue queue;
-} Search;
-
-/* Number of items of scratch of the functions below, for V vertices. */
-EXPORTED int64_t edge_search_items(int64_t v)
+int64_t edge_search_items(int64_t v)
 {
     return 4 * v + items_of_queue(v);
 }
 
-static int take_search(Scratch *scratch, int64_t v, Search *search)
+int take_search(Scratch *scratch, int64_t v, Search *search)
 {
     TRY(take(scratch, v, &search->distances));
     TRY(take_integers(scratch, v, &search->previous));
@@ -99,8 +78,7 @@ static int take_search(Scratch *scratch, int64_t v, Search *search)
     return OK;
 }
 
-/* Records a path to a vertex unless a path that is not longer is known. */
-static int reach(Search *search, int64_t vertex, double distance, int64_t previous, int64_t arc)
+int reach(Search *search, int64_t vertex, double distance, int64_t previous, int64_t arc)
 {
     CHECK(vertex, search->queue.capacity);
     if (!(distance < search->distances[vertex])) return OK;
@@ -114,9 +92,8 @@ static int reach(Search *search, int64_t vertex, double distance, int64_t previo
     return enqueue(&search->queue, vertex, distance);
 }
 
-/* Finds the next vertex by distance, or -1 if there is none; goes on from it up to a distance. */
-static int next_vertex(const EdgeGraph *graph, double longest, Search *search, int64_t *vertex,
-                       int64_t *work)
+int next_vertex(const EdgeGraph *graph, double longest, Search *search, int64_t *vertex,
+                int64_t *work)
 {
     *vertex = -1;
     if (search->queue.count == 0) return OK;
@@ -131,7 +108,7 @@ static int next_vertex(const EdgeGraph *graph, double longest, Search *search, i
     return OK;
 }
 
-static int end_search(Search *search)
+int end_search(Search *search)
 {
     int64_t item;
     while (search->queue.count > 0) TRY(dequeue(&search->queue, &item));
@@ -165,57 +142,6 @@ EXPORTED int distances_along_edges(const EdgeGraph *graph, int64_t k, const int6
         } while (vertex >= 0);
         for (int64_t i = 0; i < v; i++) distances[*done * v + i] = search.distances[i];
         TRY(end_search(&search));
-    }
-    return OK;
-}
-
-/* The nearest cells of cells. */
-typedef struct {
-    int64_t n;               /* number of cells */
-    int64_t most;            /* number of cells that are wanted around each of them */
-    double longest;          /* distance up to which they are searched for */
-    const int64_t *vertices; /* (n) of the cells, ascending */
-    int64_t *counts;         /* (n) becomes the number of cells that are found */
-    int64_t *cells;          /* (n, most) become these cells, by distance */
-    double *distances;       /* (n, most) become their distances */
-} NearestCells;
-
-static int nearest_of_cell(const EdgeGraph *graph, const int64_t *cell_at, Search *search,
-                           const NearestCells *nearest, int64_t cell, int64_t *work)
-{
-    int64_t vertex, first = cell * nearest->most, count = 0;
-    TRY(reach(search, nearest->vertices[cell], 0.0, -1, -1));
-    while (count < nearest->most) {
-        TRY(next_vertex(graph, nearest->longest, search, &vertex, work));
-        if (vertex < 0) break;
-        if (cell_at[vertex] < 0 || cell_at[vertex] == cell) continue;
-        nearest->cells[first + count] = cell_at[vertex];
-        nearest->distances[first + count++] = search->distances[vertex];
-    }
-    nearest->counts[cell] = count;
-    return end_search(search);
-}
-
-/* Finds the nearest cells of each cell along edges, from the cell of index `done` on. Of several
-   cells at the same distance, that of the lowest index is nearer.
-
-   It returns early after `most_work` arcs; `done` is raised to the number of finished cells. */
-EXPORTED int nearest_cells(const EdgeGraph *graph, const NearestCells *nearest, double *scratch,
-                           int64_t scratch_items, int64_t most_work, int64_t *done)
-{
-    Scratch memory = {scratch, scratch_items};
-    Search search;
-    int64_t v = graph->vertex_count, work = 0, *cell_at;
-    TRY(take_search(&memory, v, &search));
-    TRY(take_integers(&memory, v, &cell_at));
-    for (int64_t i = 0; i < v; i++) cell_at[i] = -1;
-    for (int64_t cell = 0; cell < nearest->n; cell++) {
-        CHECK(nearest->vertices[cell], v);
-        cell_at[nearest->vertices[cell]] = cell;
-    }
-    for (; *done < nearest->n && work < most_work; ++*done) {
-        CHECK(*done, nearest->n);
-        TRY(nearest_of_cell(graph, cell_at, &search, nearest, *done, &work));
     }
     return OK;
 }

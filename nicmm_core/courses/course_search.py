@@ -150,13 +150,15 @@ def find_courses(
     legs = legs_of_order(np.arange(len(points)), closed)
     if len(legs) > MOST_LEGS:
         return
+    size = len(surface.mesh.vertices)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
     if seed:
-        waves = random_waves(along[:, : len(surface.mesh.vertices)], graph.spacing, seed)
+        waves = random_waves(along[:, :size], graph.spacing, seed)
         factor = np.exp(LENGTH_NOISE * waves) * (1.0 if factor is None else factor)
     tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
+    length = float(along[:, size:][legs[:, 0], legs[:, 1]].sum())
     courses = with_control_points(
-        graph, points, corners, along, legs, factor, tension, surface.normal_bending
+        graph, points, corners, length, factor, tension, surface.normal_bending
     )
     checkpoint()
     found = candidates(courses, surface, closed, smoothness, any_order, search_size.candidates)

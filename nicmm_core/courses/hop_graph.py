@@ -29,10 +29,19 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.numbering import principal_frame
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints
-from ..geometry.vectors import dot
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.elastic_energy import normal_bending_of_steps
+from .hops import (
+    Hops,
+    bending,
+    continuations,
+    hops_from,
+    in_both_directions,
+    joined_hops,
+    mean_length,
+    turning,
+)
 
 SEARCH_CELLS = (700, 500)
 """Numbers of cells per component. Searches with different seeds take them in turn, since each graph
@@ -41,46 +50,11 @@ misses other courses. More cells would refine a course, which relaxation does be
 NORMAL_WEIGHT = 1.2
 """As `geometry.sampling.NORMAL_WEIGHT`, but larger: courses around thin limbs need cells there."""
 
-HOPS = 16
-"""Number of hops from a cell to its nearest cells, before the reverse hops are added."""
-
-REACH = 4.2
-"""Greatest length of a hop, in square roots of the area per cell."""
-
-SAME_SHEET = 1.6
-"""Greatest length of a hop along edges, relative to its length in space.
-
-Beyond this ratio the two cells lie on different sheets of the surface.
-"""
-
 SHARPEST_TURN = 2.0 * np.pi / 3.0
 """Greatest turn at a cell, in radians.
 
 A third of all continuations turn by more; two smaller turns cost less there.
 """
-
-EDGE_DETOUR = 1.07
-"""Mean length of the shortest path along edges, relative to the geodesic distance."""
-
-
-@dataclass(frozen=True)
-class Hops:
-    """Directed hops.
-
-    Attributes
-    ----------
-    start, end : (m,) int array
-        Cells at the start and at the end of each hop.
-    length : (m,) float array
-    leaving, arriving : (m, 3) float array
-        Unit tangents at the start and at the end.
-    """
-
-    start: IntArray
-    end: IntArray
-    length: FloatArray
-    leaving: FloatArray
-    arriving: FloatArray
 
 
 @dataclass(frozen=True)
@@ -136,19 +110,13 @@ def build_hop_graph(surface: CurveSurface, cells: int = SEARCH_CELLS[0]) -> HopG
         normals = surface.vertex_normals
         vertex = spread_vertices(mesh, frame, normals, areas, candidates, distance, NORMAL_WEIGHT)
     checkpoint()
-    start, end, along = nicmm_kernels.nearest_cells(
-        mesh.edge_graph, vertex, HOPS, REACH * spacing, checkpoint
+    places = nicmm_kernels.HopPlaces(
+        len(vertex),
+        vertex.repeat(3).reshape(-1, 3),
+        mesh.vertices[vertex],
+        surface.vertex_normals[vertex],
     )
-    size = len(vertex)
-    key = np.concatenate([start * size + end, end * size + start])
-    key, first = np.unique(key, return_index=True)
-    start, end, along = key // size, key % size, np.tile(along, 2)[first]
-    positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
-    hops = _hops(start, end, along, positions, normals)
-    in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
-    same_sheet = along <= SAME_SHEET * in_space
-    hops, key = select_hops(hops, same_sheet), key[same_sheet]
-    reverse = np.searchsorted(key, hops.end * size + hops.start)
+    hops, reverse = in_both_directions(hops_from(surface, places, 0, spacing), len(vertex))
     return HopGraph(surface, vertex, spacing, hops, reverse)
 
 
@@ -204,6 +172,18 @@ class CourseGraph:
             self.previous, self.first,
         )  # fmt: skip
 
+    @cached_property
+    def _by_ends(self) -> tuple[IntArray, IntArray]:
+        """The states by their starts and ends, and a number for both, ascending."""
+        both = self.hops.start * len(self.positions) + self.hops.end
+        order = np.argsort(both, kind="stable")
+        return order, both[order]
+
+    def state_between(self, start: IntArray, end: IntArray) -> IntArray:
+        """The states of the hops from some cells to others, which there must be."""
+        order, both = self._by_ends
+        return order[np.searchsorted(both, start * len(self.positions) + end)]
+
     def last(self, end: int) -> IntArray:
         """The last state on the best path through each state to a control point, (m + 2 d,)."""
         return self.reverse[self.first[end][self.reverse]]
@@ -213,8 +193,7 @@ def with_control_points(
     graph: HopGraph,
     points: SurfacePoints,
     corners: BoolArray,
-    along: FloatArray,
-    legs: IntArray,
+    length: float,
     factor: FloatArray | None,
     tension: float,
     normal_bending: float,
@@ -228,33 +207,23 @@ def with_control_points(
         k control points on the component of the graph.
     corners : (k,) bool array
         At which of them a course may turn freely.
-    along : (k, V + k) float array
-        Distances from the control points, by `distances_along_edges`.
-    legs : (l, 2) int array
-        Indices of the two points of each leg.
+    length : float
+        Length L of the shortest path through the points.
     factor : (V,) float array or None
         Factor of lengths at the vertices; None for no factor.
     tension : float
-        τ L², where L is the length of the shortest path through the points.
+        τ L².
     normal_bending : float
         Weight of the normal curvature, squared.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
-    length = along[:, len(surface.mesh.vertices) :][legs[:, 0], legs[:, 1]].sum()
-    cells = np.concatenate([graph.vertex, len(surface.mesh.vertices) + np.arange(k)])
-    to_cells = along[:, cells]
-    to_cells[np.arange(k), n + np.arange(k)] = np.inf
-    to_cells[to_cells > REACH * graph.spacing] = np.inf
-    nodes = nodes_at(surface, points, closed=False)
-    mesh = surface.mesh
+    mesh, nodes = surface.mesh, nodes_at(surface, points, closed=False)
     positions = np.concatenate([mesh.vertices[graph.vertex], nodes.positions])
     normals = np.concatenate([surface.vertex_normals[graph.vertex], nodes.normals])
-    control, cell = _nearest(to_cells, HOPS)
-    departures = _hops(n + control, cell, to_cells[control, cell], positions, normals)
-    arrivals = Hops(
-        departures.end, departures.start, departures.length, -departures.arriving,
-        -departures.leaving,
-    )  # fmt: skip
+    around = np.concatenate([graph.vertex.repeat(3).reshape(-1, 3), mesh.faces[points.faces]])
+    places = nicmm_kernels.HopPlaces(n, around, positions, normals)
+    departures = hops_from(surface, places, n, graph.spacing)
+    arrivals, control = departures.reversed, departures.start - n
     hops = joined_hops([graph.hops, departures, arrivals])
     m, d = len(graph.reverse), len(control)
     reverse = np.concatenate([graph.reverse, np.arange(m + d, m + 2 * d), np.arange(m, m + d)])
@@ -262,7 +231,7 @@ def with_control_points(
     if factor is not None:
         at_cells = np.concatenate([factor[graph.vertex], _at_points(surface, points, factor)])
         weighted = weighted * 0.5 * (at_cells[hops.start] + at_cells[hops.end])
-    weights = tension / max(float(length), tolerances.TINY) ** 2 * weighted
+    weights = tension / max(length, tolerances.TINY) ** 2 * weighted
     if normal_bending:
         start, end = hops.start, hops.end
         weights = weights + normal_bending * normal_bending_of_steps(
@@ -314,92 +283,6 @@ def _best_paths(
     cost[:, reverse], previous[:, reverse], begins[:, reverse] = np.inf, -1, reverse
     cost[departures.end[direct] - n, reverse] = weights[m + direct]
     return cost, previous, begins
-
-
-def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """All pairs of a hop and an item of the cell where the hop ends, by the indices of both.
-
-    Parameters
-    ----------
-    ends : (p,) int array
-        Cell at which each hop ends.
-    first : (cells + 1,) int array
-        Index of the first item of each cell, and the number of items at the end. Items are sorted
-        by cell; they may be the hops that start there.
-    """
-    count = first[ends + 1] - first[ends]
-    hop = np.repeat(np.arange(len(ends)), count)
-    place = np.arange(len(hop)) - np.repeat(np.cumsum(count) - count, count)
-    return hop, first[ends[hop]] + place
-
-
-def turning(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
-    """Turning angle θ from hops to their continuations, in radians, 0 … π."""
-    arriving, leaving = one.arriving.take(before, axis=0), other.leaving.take(after, axis=0)
-    return np.arccos(dot(arriving.T, leaving.T).clip(-1.0, 1.0))
-
-
-def mean_length(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
-    """h, the mean lengths of hops and their continuations; never zero."""
-    step = 0.5 * (one.length[before] + other.length[after])
-    return np.maximum(step, tolerances.TINY)
-
-
-def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
-    """θ² / h from hops to their continuations."""
-    turn = turning(one, before, other, after)
-    return turn**2 / mean_length(one, before, other, after)
-
-
-def select_hops(hops: Hops, which: IntArray | BoolArray) -> Hops:
-    """Some of the hops, by indices or a mask."""
-    return Hops(
-        hops.start[which], hops.end[which], hops.length[which], hops.leaving[which],
-        hops.arriving[which],
-    )  # fmt: skip
-
-
-def joined_hops(parts: list[Hops]) -> Hops:
-    """Concatenate hops."""
-    return Hops(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("start", "end", "length", "leaving", "arriving")
-        )
-    )
-
-
-def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:
-    """Row and column of the `count` least finite distances of each row, rows ascending."""
-    if distance.shape[1] > count:
-        farthest = np.partition(distance, count - 1, axis=1)[:, count - 1, None]
-        distance = np.where(distance <= farthest, distance, np.inf)
-    row, column = np.nonzero(np.isfinite(distance))
-    order = np.lexsort((distance[row, column], row))  # stable
-    row, column = row[order], column[order]
-    place = np.arange(len(row)) - np.searchsorted(row, row)
-    return row[place < count], column[place < count]
-
-
-def _hops(
-    start: IntArray,
-    end: IntArray,
-    along_edges: FloatArray,
-    positions: FloatArray,
-    normals: FloatArray,
-) -> Hops:
-    """Hops between cells with given positions and normals."""
-    offset = positions[end] - positions[start]
-    length = np.maximum(np.linalg.norm(offset, axis=1), along_edges / EDGE_DETOUR)
-    return Hops(
-        start, end, length, tangents(offset, normals[start]), tangents(offset, normals[end])
-    )
-
-
-def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
-    """Unit vectors along the projections of vectors, (m, 3), onto planes with given normals."""
-    flat = vectors - np.einsum("md,md->m", vectors, normals)[:, None] * normals
-    return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
 
 
 def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> FloatArray:

@@ -27,7 +27,7 @@ from ..relaxation.node_traces import (
     traced_segments,
     traces_between_nodes,
 )
-from .hop_graph import CourseGraph, tangents
+from .hop_graph import CourseGraph
 from .leg_routes import Routes, junction_cost, without_rounding_errors
 
 NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
@@ -137,8 +137,11 @@ def curves_on_routes(
     paths = [path for leg in routes for path in leg.cells]
     cells = np.concatenate(paths)
     begins = np.cumsum([0, *(len(path) for path in paths)])
-    steps = np.linalg.norm(np.diff(graph.positions[cells], axis=0), axis=1)
-    steps[begins[1:-1] - 1] = 0.0  # the distance between two paths does not count
+    paired = np.ones(len(cells) - 1, dtype=bool)
+    paired[begins[1:-1] - 1] = False  # from one path to the next there is no hop
+    state, steps = np.zeros(len(paired), dtype=np.int64), np.zeros(len(paired))
+    state[paired] = graph.state_between(cells[:-1][paired], cells[1:][paired])
+    steps[paired] = graph.hops.length[state[paired]]
     arc = np.append(0.0, np.cumsum(steps))
     at = np.linspace(arc[begins[:-1]], arc[begins[1:] - 1], count, axis=1)
     hop = np.searchsorted(arc, at, side="right") - 1
@@ -146,11 +149,11 @@ def curves_on_routes(
     along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0).ravel()
     one, other = cells[hop.ravel()], cells[hop.ravel() + 1]
     nearer = along <= 0.5 + tolerances.ROUNDED  # halfway counts as nearer to the first
-    start, end = np.where(nearer, one, other), np.where(nearer, other, one)
-    places = _places_of_cells(graph)[start]
-    offset = graph.positions[end] - graph.positions[start]
-    direction = tangents(offset, graph.normals[start])
-    length = np.where(nearer, along, 1.0 - along) * np.linalg.norm(offset, axis=1)
+    places = _places_of_cells(graph)[np.where(nearer, one, other)]
+    taken = state[hop.ravel()]
+    leaving, arriving = graph.hops.leaving[taken], graph.hops.arriving[taken]
+    direction = np.where(nearer[:, None], leaving, -arriving)
+    length = np.where(nearer, along, 1.0 - along) * graph.hops.length[taken]
     ends = _is_end(count, paths)
     length[ends | (length <= tolerances.SAME_POSITION * surface.mesh.diagonal)] = 0.0
     inside = SurfacePoints(places.faces, strictly_inside(places.barycentric))

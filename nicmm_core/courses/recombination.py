@@ -21,7 +21,6 @@ from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies, comparable_terms
 from ..relaxation.node_traces import places_along, traces_between_nodes
 from .comparison import SAME_COURSE
-from .hop_graph import tangents
 from .leg_combinations import (
     LegCurves,
     cheapest_combinations,
@@ -238,8 +237,8 @@ def _turning_costs(
     count = legs.per_curve
     positions, normals = (each.reshape(-1, count, 3) for each in (legs.positions, legs.normals))
     length = legs.by_curve(legs.step_lengths).sum(axis=1)
-    leaving = tangents(positions[:, 1] - positions[:, 0], normals[:, 0])
-    arriving = tangents(positions[:, -1] - positions[:, -2], normals[:, -1])
+    leaving = _tangents(positions[:, 1] - positions[:, 0], normals[:, 0])
+    arriving = _tangents(positions[:, -1] - positions[:, -2], normals[:, -1])
     inverse = 1.0 / np.maximum(length, tolerances.TINY)
     following = [*of_legs[1:], *of_legs[:1]] if closed else of_legs[1:]
     costs = []
@@ -249,6 +248,12 @@ def _turning_costs(
             angle = np.zeros_like(angle)
         costs.append(scale * angle**2 * (inverse[before, None] + inverse[after]))
     return costs
+
+
+def _tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
+    """Unit vectors along the projections of vectors, (m, 3), onto planes with given normals."""
+    flat = vectors - np.einsum("md,md->m", vectors, normals)[:, None] * normals
+    return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
 
 
 def _distinct_legs(curves: LegCurves, cost: FloatArray, limit: float) -> tuple[IntArray, IntArray]:

@@ -43,38 +43,6 @@ def test_vertices_of_no_face_are_infinitely_far_away():
     assert np.isinf(found[0, -1]) and np.isfinite(found[0, :-1]).all()
 
 
-@pytest.mark.parametrize("edges", [2.5, np.inf])
-def test_nearest_cells(creature, distances, edges):
-    longest = edges * creature.mean_edge_length
-    cells = np.arange(0, len(creature.vertices), 3)
-    one, other, along = nicmm_kernels.nearest_cells(
-        creature.edge_graph, cells, 7, longest, lambda: None
-    )
-    between = distances[np.ix_(cells, cells)]
-    np.fill_diagonal(between, np.inf)
-    between[between > longest] = np.inf
-    order = np.argsort(between, axis=1, kind="stable")[:, :7]
-    row = np.arange(len(cells)).repeat(7)
-    finite = np.isfinite(between[row, order.ravel()])
-    np.testing.assert_array_equal(one, row[finite])
-    np.testing.assert_array_equal(other, order.ravel()[finite])
-    np.testing.assert_allclose(along, between[one, other], rtol=1e-12)
-    assert np.isinf(longest) == finite.all()
-
-
-def test_equally_near_cells_are_found_in_the_order_of_their_indices():
-    """Around the pole of an octahedron four vertices are equally near."""
-    vertices = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1]])
-    faces = np.array([[p, 1 + i, 1 + (i + 1) % 4] for p in (0, 5) for i in range(4)])
-    faces[4:] = faces[4:, ::-1]
-    mesh = type(shapes.sphere(1))(vertices.astype(float), faces)
-    one, other, _ = nicmm_kernels.nearest_cells(
-        mesh.edge_graph, np.arange(6), 3, np.inf, lambda: None
-    )
-    assert other[one == 0].tolist() == [1, 2, 3]
-    assert other[one == 5].tolist() == [1, 2, 3]
-
-
 def test_points_on_paths_lie_on_edges_at_their_shares(creature, distances):
     rng = np.random.default_rng(2)
     start, end = rng.integers(0, len(creature.vertices), (2, 60))

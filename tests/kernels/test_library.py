@@ -289,11 +289,16 @@ def arguments_distances(k=4):
     }
 
 
-def arguments_cells(n=30):
-    """Arguments of `nearest_cells` for n cells, by name."""
+def arguments_hops(n=30):
+    """Arguments of `surface_hops` for n cells and up to two points, by name."""
+    points = BALL.faces[5 : 5 + min(n, 2)]
+    corners = np.concatenate([np.repeat(3 * np.arange(n), 3).reshape(-1, 3), points])
+    positions = BALL.vertices[corners].mean(axis=1)
     return {
         "graph": BALL.edge_graph,
-        "vertices": 3 * np.arange(n),
+        "vertex_normals": BALL.vertices.copy(),
+        "places": nicmm_kernels.HopPlaces(n, corners, positions, positions.copy()),
+        "first": 0,
         "most": 5,
         "longest": 2.0,
         "meanwhile": nothing,
@@ -474,7 +479,7 @@ CALLS = {
         lambda: {"mesh": BALL.for_kernels},
     ),
     "distances_along_edges": (nicmm_kernels.distances_along_edges, arguments_distances),
-    "nearest_cells": (nicmm_kernels.nearest_cells, arguments_cells),
+    "surface_hops": (nicmm_kernels.surface_hops, arguments_hops),
     "points_on_edge_paths": (nicmm_kernels.points_on_edge_paths, arguments_paths),
     "distances_from_segments": (distances_from_segments, arguments_segments_in_faces),
     "refine_at_level": (refined, arguments_refinement),
@@ -520,7 +525,7 @@ INDICES = {
     "segment_ends": [("segments", None)],
     "polyline_crossings": [("faces", None)],
     "distances_along_edges": [("corners", None)],
-    "nearest_cells": [("vertices", None)],
+    "surface_hops": [("places", 1)],
     "points_on_edge_paths": [("starts", None), ("ends", None)],
     "turning_paths": [("onward", 1), ("leaving", 1), ("arriving", 1)],
     "best_legs": [("graph", 2), ("graph", 3)],
@@ -536,7 +541,6 @@ OF_ANY_LENGTH = [
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
     ("polyline_crossings", "all_faces"),
-    ("nearest_cells", "vertices"),
     ("nearest_places", "begins"),
     ("nearest_places", "faces"),
     ("turning_paths", "begins"),
@@ -565,11 +569,11 @@ RESUMED = [
     "distinct_curves",
     "distances_along_edges",
     "meeting_segments",
-    "nearest_cells",
     "nearest_places",
     "points_on_edge_paths",
     "polyline_crossings",
     "relax_curves",
+    "surface_hops",
     "trace_between",
     "trace_from",
     "trace_steps",

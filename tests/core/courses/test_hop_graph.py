@@ -20,17 +20,11 @@ LEGS = np.array([[0, 1], [1, 2], [2, 0]])
 def graph_through(mesh, positions, legs=LEGS, tension=160.0):
     surface = curve_surface(mesh)
     points = points_near(mesh, np.asarray(positions, dtype=float))
-    along = distances_along_edges(surface, points)
-    return with_control_points(
-        build_hop_graph(surface),
-        points,
-        np.zeros(len(points), bool),
-        along,
-        legs,
-        None,
-        tension,
-        0.0,
-    )
+    between = distances_along_edges(surface, points)[:, len(mesh.vertices) :]
+    length = between[legs[:, 0], legs[:, 1]].sum()
+    no_corners = np.zeros(len(points), bool)
+    graph = build_hop_graph(surface)
+    return with_control_points(graph, points, no_corners, length, None, tension, 0.0)
 
 
 def by_state(graph, start, end):
