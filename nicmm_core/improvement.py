@@ -1,8 +1,7 @@
 """Improves the first curve of a request by further attempts, while their gain justifies the work.
 
-The farther a curve winds around limbs, the more courses a search misses. So the search is repeated,
-with other lengths and another tension, if the curve bends, and more often if even the best curve
-bends strongly. Then, or before if there are many control points, the parts that bend most are
+The farther a curve winds around limbs, the more courses a search misses. So if the curve bends,
+the search is repeated with other lengths and another tension. Then the parts that bend most are
 searched for again. If the best curve has kinks, the initial path is tried before these searches,
 and more tension after them. At last come courses for alternatives.
 """
@@ -43,7 +42,7 @@ BENT = 15.0
 """L ∮ κ_g² ds above which the parts that bend most are searched for again."""
 
 STRONGLY_BENT = 20.0
-"""L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
+"""L ∮ κ_g² ds above which further courses of a search follow; a circle has 4π², about 40."""
 
 WITH_NORMAL_BENDING = 14.0
 """Increase of these three bounds, relative to them, for each unit of `normal_bending`.
@@ -63,8 +62,8 @@ With normal bending, a loop beside a limb may be found first, and a ring around 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 3
-"""Greatest number of repeated searches for the whole curve; strongly bent curves get all."""
+FURTHER_SEARCHES = 1
+"""Greatest number of repeated searches for the whole curve; more of them gain hardly anything."""
 
 COURSES_OF_A_SEARCH = 3
 """Greatest number of courses relaxed after a search whose curves are strongly bent.
@@ -72,15 +71,8 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-SEARCHES_FOR_PARTS, OF_MANY_POINTS = 6, 8
-"""Greatest number of searches for parts of the best curve; and the same through so many control
-points that the spline is tried."""
-
-DENSE_POINTS = 12
-"""Number of control points from which parts are searched for before the whole curve again.
-
-Most legs are then right, and hardly any search for the whole curve finds all of them at once.
-"""
+SEARCHES_FOR_PARTS = 8
+"""Greatest number of searches for parts of the best curve."""
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
 """Greatest numbers of courses looked at after each of them, and of those relaxed."""
@@ -141,9 +133,6 @@ class Improvement:
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     path_tried : bool
         Whether the initial path has been tried.
-    repeat_found_same_curve, spline_found_same_curve : bool
-        Whether the last repeated search, or the spline, has found the best curve of before once
-        more.
     """
 
     search: StartSearch
@@ -155,8 +144,6 @@ class Improvement:
     searches: int = 1
     parts: int = 0
     path_tried: bool = False
-    repeat_found_same_curve: bool = False
-    spline_found_same_curve: bool = False
 
     def attempt(self, start: InitialCurve, config: RelaxationConfig) -> None:
         """Relax a start."""
@@ -197,26 +184,22 @@ class Improvement:
         start_kind: StartKind,
     ) -> None:
         """Try the spline, courses of the first search and of further ones, and other parts."""
+        by_course = start_kind is StartKind.COURSE
         if start_kind is StartKind.CLOSE_POINTS:
             self.searches = 0
             by_course = self._try_courses(courses)
-            self.spline_found_same_curve = self.repeat_found_same_curve
-        else:
-            by_course = start_kind is StartKind.COURSE
-            if has_many_points(self.request) and start_kind is not StartKind.SPLINE:
-                self._try_spline()
-            if by_course:
-                self._try_other_courses(courses)
+        elif has_many_points(self.request) and start_kind is not StartKind.SPLINE:
+            self._try_spline()
+        found_twice = self._found_same_curve(1)
+        if start_kind is StartKind.COURSE:
+            self._try_other_courses(courses)
         self._try_path()
-        is_dense = len(self.request.points) >= DENSE_POINTS
-        if is_dense:
-            self._try_other_parts()
-        if by_course:
-            for repeated in further:
-                if not (self._should_search_again() and self._try_courses(repeated)):
-                    break
-        if not is_dense:
-            self._try_other_parts()
+        for repeated in further if by_course else ():
+            before = len(self.starts)
+            if found_twice or not self._should_search_again() or not self._try_courses(repeated):
+                break
+            found_twice = self._found_same_curve(before)
+        self._try_other_parts()
 
     @property
     def _config(self) -> RelaxationConfig:
@@ -227,9 +210,7 @@ class Improvement:
         """Try the spline through the control points, in the order of the first start."""
         start = self.search.by_spline(self.request, self.starts[0].visited)
         if start is not None:
-            before = len(self.starts)
             self.attempt(start, self._config)
-            self.spline_found_same_curve = self._found_same_curve(before)
 
     def _try_path(self) -> None:
         """Try the initial path, once, if the best curve has kinks.
@@ -249,14 +230,12 @@ class Improvement:
 
         On rough meshes hardly any course is simple, and each failure takes long.
         """
-        before = len(self.starts)
         self.searches += 1
         start = next(courses, None)
         if start is None:
             return False
         self.attempt(start, self._config)
         self._try_other_courses(courses)
-        self.repeat_found_same_curve = self._found_same_curve(before)
         return True
 
     def _try_other_courses(self, courses: Iterator[InitialCurve]) -> None:
@@ -280,7 +259,7 @@ class Improvement:
         """Try the best curve with other courses in the parts that bend most."""
         changed = self.best
         parts = bent_parts(self.curves[changed])
-        for _ in range(OF_MANY_POINTS if has_many_points(self.request) else SEARCHES_FOR_PARTS):
+        for _ in range(SEARCHES_FOR_PARTS):
             part = next(parts, None)
             if part is None or not self._should_try_another_part():
                 break
@@ -345,24 +324,18 @@ class Improvement:
         return least - found > LEAST_GAIN * self._elastic_energy(earlier)
 
     def _found_same_curve(self, before: int) -> bool:
-        """Whether the best result from an index on is the best one before it once more."""
+        """Whether the best result from an index on, if any, is the best one before it once more."""
         energies, curves = self.energies, self.curves
+        if len(curves) == before:
+            return False
         earlier = curves[energies.index(min(energies[:before]))]
         latest = curves[before + energies[before:].index(min(energies[before:]))]
         is_same = not is_apart(self._surface, latest, [earlier])
         return is_same and not self._gained_since(before)
 
     def _should_search_again(self) -> bool:
-        """Whether another search is affordable and may find a far better curve.
-
-        The first repeated search is worthwhile if the best curve bends; those after it, only if it
-        is still strongly bent and two searches have not found the same curve.
-        """
-        least = self._bound(STRONGLY_BENT)
-        if self.searches == 1:
-            least = min(self._bound(SLIGHTLY_BENT), LIKE_CIRCLE)
-        found_twice = self.repeat_found_same_curve or self.spline_found_same_curve
-        promising = self._bending > least and not found_twice
+        """Whether another search may find a far better curve and is affordable."""
+        promising = self._bending > min(self._bound(SLIGHTLY_BENT), LIKE_CIRCLE)
         return promising and self._is_affordable(self._work / self.searches + self._reserved)
 
     def _should_try_another_course(self, first: int) -> bool:

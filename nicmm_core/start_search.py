@@ -15,7 +15,7 @@ import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
 from .courses.bent_part import BentPart, request_for_part, with_part
-from .courses.comparison import is_apart
+from .courses.comparison import PARTS_APART, is_apart
 from .courses.course_search import PART, WHOLE, SearchSize
 from .courses.course_surface import Course, CourseSurface, joined_courses
 from .geometry.array_types import IntArray
@@ -36,11 +36,6 @@ MOST_FAILURES = 4
 """Number of courses in a row that are not simple on the mesh after which a search ends.
 
 On rough meshes each of them takes long.
-"""
-
-PARTS_APART = 0.005
-"""Distance between two courses of a part, relative to the diagonal of the mesh, below which they
-are the same; less than between whole courses, since a part may lead around a finger.
 """
 
 FEWEST_FOR_SPLINE = 6

@@ -16,6 +16,9 @@ from ..relaxation.discrete_curve import DiscreteCurve
 SAME_COURSE = 0.02
 """Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
 
+PARTS_APART = 0.005
+"""The same for courses of a part of a curve; less, since a part may lead around a finger."""
+
 SAMPLES = 500
 """Number of points at which two curves are compared."""
 

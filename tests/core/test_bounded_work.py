@@ -113,7 +113,7 @@ def test_forty_points_back_and_forth(monkeypatch):
 
 
 def test_repeated_searches_are_bounded(monkeypatch):
-    """Courses are searched again once if a curve bends, and more often if it is strongly bent."""
+    """Courses are searched for again if a curve bends, unless two searches have found it."""
     searched = []
     seek = start_search.StartSearch.courses
 
@@ -123,7 +123,6 @@ def test_repeated_searches_are_bounded(monkeypatch):
 
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)
-    monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(improvement, "SLIGHTLY_BENT", 0.0)
     monkeypatch.setattr(improvement, "STRONGLY_BENT", 1e9)
     monkeypatch.setattr(improvement, "MOST_WORK", 1e9)
@@ -131,7 +130,7 @@ def test_repeated_searches_are_bounded(monkeypatch):
     nicmm.design_curve(body, chosen)
     assert searched == [0, 1]
     searched.clear()
-    monkeypatch.setattr(improvement, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(improvement, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(improvement, "is_apart", lambda *curves: True)
     nicmm.design_curve(body, chosen)
