@@ -56,7 +56,7 @@ class SearchSize:
     finalists: int
 
 
-WHOLE = SearchSize((12, 10, 8, 6, 6, 6), 8, 6)
+WHOLE = SearchSize((20, 16, 16, 16, 16, 16), 16, 10)
 """Size of a search for a whole curve."""
 
 PART = SearchSize((16,), 6, 4)
