@@ -36,7 +36,7 @@ MOST = 4
 
 EFFORTS: Mapping[str, tuple[int, int, int]] = {
     "one search": (0, 0, 1),
-    "two searches": (improvement.FURTHER_SEARCHES, 0, 1),
+    "repeated searches": (improvement.FURTHER_SEARCHES, 0, 1),
     "default": (improvement.FURTHER_SEARCHES, improvement.SEARCHES_FOR_PARTS, 1),
     f"{MOST} times the default": (
         MOST * improvement.FURTHER_SEARCHES,
@@ -92,9 +92,10 @@ def section(results: Results) -> str:
     )  # fmt: skip
     return (
         "The table shows how the energy of a curve and the time of its design depend on how "
-        "long courses are searched for. Each row is an effort: a single search; a second one if "
-        "the curve bends; these and searches for parts (the default); and "
-        f"{MOST} times as many further searches with {MOST} times the bound on work. The "
+        "long courses are searched for. Each row is an effort: a single search; repeated "
+        f"searches (up to {improvement.FURTHER_SEARCHES}) if the curve bends; these and searches "
+        f"for parts (the default); and {MOST} times as many further searches with {MOST} times "
+        "the bound on work. The "
         f"statistics are over closed curves on {len(requests)} meshes ({results['meshes']}, and "
         "closed manifold meshes, people and animals as they are; one set of 3–5 random vertices "
         f"per mesh, shortest order, seed {results['seed']}). An energy is divided by the least one "

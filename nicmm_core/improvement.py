@@ -1,9 +1,10 @@
 """Improves the first curve of a request by further attempts, while their gain justifies the work.
 
 The farther a curve winds around limbs, the more courses a search misses. So if the curve bends,
-the search is repeated with other lengths and another tension. Then the parts that bend most are
-searched for again. If the best curve has kinks, the initial path is tried before these searches,
-and more tension after them. At last come courses for alternatives.
+the search is repeated with other lengths and other tensions, until two searches have found the same
+curve. Then the parts that bend most are searched for again. If the best curve has kinks, the
+initial path is tried before these searches, and more tension after them. At last come courses for
+alternatives.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ With normal bending, a loop beside a limb may be found first, and a ring around 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 1
-"""Greatest number of repeated searches for the whole curve; more of them gain hardly anything."""
+FURTHER_SEARCHES = 2
+"""Greatest number of repeated searches for the whole curve. A third one gains hardly anything."""
 
 COURSES_OF_A_SEARCH = 3
 """Greatest number of courses relaxed after a search whose curves are strongly bent.
