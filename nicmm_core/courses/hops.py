@@ -17,11 +17,17 @@ from ..geometry.vectors import dot, lengths, unit
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface
 
-HOPS = 20
+HOPS = 16
 """Number of hops from a place to its nearest places, before the reverse hops are added."""
 
 REACH = 4.2
 """Greatest length of a hop, in square roots of the area per cell."""
+
+DETOUR = 1.6
+"""Greatest length of the path along edges, relative to the straight way.
+
+A longer path leads around a hole, an obstacle or a boundary, and the straight way across it.
+"""
 
 
 @dataclass(frozen=True)
@@ -73,8 +79,9 @@ def hops_from(
     # The bending at a hop without length would be infinite.
     shortest = np.maximum(in_space, tolerances.SAME_POSITION * mesh.diagonal)
     length = np.maximum(lengths(found.leaving.T), shortest)
-    leaving, arriving = unit(found.leaving.T).T, unit(found.arriving.T).T
-    return Hops(found.start, found.end, length, leaving, arriving)
+    kept = found.distance <= DETOUR * length
+    leaving, arriving = unit(found.leaving[kept].T).T, unit(found.arriving[kept].T).T
+    return Hops(found.start[kept], found.end[kept], length[kept], leaving, arriving)
 
 
 def in_both_directions(hops: Hops, size: int) -> tuple[Hops, IntArray]:

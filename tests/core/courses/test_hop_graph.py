@@ -11,6 +11,7 @@ from nicmm_core.courses.hop_graph import (
     with_control_points,
 )
 from nicmm_core.courses.leg_routes import cells_beside, leg_choices, routes_of_legs
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.core.checks import grid, points_near
 
@@ -104,6 +105,20 @@ def test_routes_pass_a_tube_on_both_sides():
         for path in routes_through(graph, np.array([[0, 1]]), closed=False)[0].cells
     }
     assert sides == {True, False}
+
+
+def test_no_hop_leads_across_a_slit():
+    """Edges around the end of a slit, developed into the plane, lead straight across it."""
+    square = grid(40)
+    middle = square.vertices[square.faces].mean(axis=1)
+    slit = (np.abs(middle[:, 0] - 0.5) < 0.03) & (middle[:, 1] > 0.2)
+    graph = build_hop_graph(curve_surface(Mesh(square.vertices, square.faces[~slit])))
+    places = square.vertices[graph.vertex]
+    start, end = places[graph.hops.start], places[graph.hops.end]
+    across = (start[:, 0] < 0.5) & (end[:, 0] > 0.5)
+    share = (0.5 - start[across, 0]) / (end[across, 0] - start[across, 0])
+    height = start[across, 1] + share * (end[across, 1] - start[across, 1])
+    assert across.any() and height.max() < 0.2 + 1.5 * graph.spacing
 
 
 def test_hops_between_neighbouring_control_points_need_no_cell():
