@@ -17,7 +17,7 @@ from ..geometry.vectors import dot, lengths, unit
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface
 
-HOPS = 16
+HOPS = 18
 """Number of hops from a place to its nearest places, before the reverse hops are added."""
 
 REACH = 4.2
