@@ -66,6 +66,8 @@ class HopGraph:
     surface : CurveSurface
     vertex : (n,) int array
         Vertices of the surface that are the n cells.
+    places : HopPlaces
+        The cells.
     spacing : float
         Square root of the area per cell.
     hops : Hops
@@ -76,6 +78,7 @@ class HopGraph:
 
     surface: CurveSurface
     vertex: IntArray
+    places: nicmm_kernels.HopPlaces
     spacing: float
     hops: Hops
     reverse: IntArray
@@ -117,7 +120,7 @@ def build_hop_graph(surface: CurveSurface, cells: int = SEARCH_CELLS[0]) -> HopG
         surface.vertex_normals[vertex],
     )
     hops, reverse = in_both_directions(hops_from(surface, places, 0, spacing), len(vertex))
-    return HopGraph(surface, vertex, spacing, hops, reverse)
+    return HopGraph(surface, vertex, places, spacing, hops, reverse)
 
 
 @dataclass(frozen=True)
@@ -217,11 +220,11 @@ def with_control_points(
         Weight of the normal curvature, squared.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
-    mesh, nodes = surface.mesh, nodes_at(surface, points, closed=False)
-    positions = np.concatenate([mesh.vertices[graph.vertex], nodes.positions])
-    normals = np.concatenate([surface.vertex_normals[graph.vertex], nodes.normals])
-    around = np.concatenate([graph.vertex.repeat(3).reshape(-1, 3), mesh.faces[points.faces]])
-    places = nicmm_kernels.HopPlaces(n, around, positions, normals)
+    nodes, cells = nodes_at(surface, points, closed=False), graph.places
+    positions = np.concatenate([cells.positions, nodes.positions])
+    normals = np.concatenate([cells.normals, nodes.normals])
+    corners_of_faces = np.concatenate([cells.corners, surface.mesh.faces[points.faces]])
+    places = nicmm_kernels.HopPlaces(n, corners_of_faces, positions, normals)
     departures = hops_from(surface, places, n, graph.spacing)
     arrivals, control = departures.reversed, departures.start - n
     hops = joined_hops([graph.hops, departures, arrivals])

@@ -174,8 +174,7 @@ def test_everything_on_the_mesh_comes_along(monkey, mode, cut_faces):
     for number, name in enumerate(("First", "Second")):
         uv = get(data.uv_layers[name].uv, "vector", 2)
         expected = np.einsum("lj,ljk->lk", homogeneous[loop_vertex], maps[loop_id] * (1 + number))
-        # Maps of thin faces magnify the rounding of positions.
-        np.testing.assert_allclose(uv, expected, atol=3e-5)
+        np.testing.assert_allclose(uv, expected, atol=1e-5)
     height = get(data.attributes["height"].data, "value")
     np.testing.assert_allclose(height, place[:, 2], atol=ROUNDING)
     colours = get(data.color_attributes["Colour"].data, "color", 4)

@@ -86,9 +86,8 @@ FINE = {
     **{f"creature {seed}": (lambda seed=seed: symmetric_creature(seed, 4)) for seed in range(2)},
     "fine torus": lambda: shapes.torus(around=384, across=192),
 }
-# Creature 13 has vertices without a mirror image.
 COARSE = {
-    **{f"creature {s}": (lambda s=s: symmetric_creature(s)) for s in range(15) if s != 13},
+    **{f"creature {seed}": (lambda seed=seed: symmetric_creature(seed)) for seed in range(14)},
     "sphere": lambda: shapes.sphere(4),
     "cube": lambda: shapes.cube(8),
     "disc": shapes.disc,
