@@ -28,7 +28,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.numbering import principal_frame
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, joined
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.elastic_energy import normal_bending_of_steps
@@ -66,8 +66,10 @@ class HopGraph:
     surface : CurveSurface
     vertex : (n,) int array
         Vertices of the surface that are the n cells.
+    cells : SurfacePoints
+        The cells as points of faces.
     places : HopPlaces
-        The cells.
+        The cells as compiled kernels read them.
     spacing : float
         Square root of the area per cell.
     hops : Hops
@@ -78,6 +80,7 @@ class HopGraph:
 
     surface: CurveSurface
     vertex: IntArray
+    cells: SurfacePoints
     places: nicmm_kernels.HopPlaces
     spacing: float
     hops: Hops
@@ -119,8 +122,10 @@ def build_hop_graph(surface: CurveSurface, cells: int = SEARCH_CELLS[0]) -> HopG
         mesh.vertices[vertex],
         surface.vertex_normals[vertex],
     )
-    hops, reverse = in_both_directions(hops_from(surface, places, 0, spacing), len(vertex))
-    return HopGraph(surface, vertex, places, spacing, hops, reverse)
+    faces = mesh.vertex_faces.indices[mesh.vertex_faces.indptr[vertex]]
+    at = SurfacePoints(faces, (mesh.faces[faces] == vertex[:, None]).astype(np.float64))
+    hops, reverse = in_both_directions(hops_from(surface, at, places, 0, spacing), len(vertex))
+    return HopGraph(surface, vertex, at, places, spacing, hops, reverse)
 
 
 @dataclass(frozen=True)
@@ -175,6 +180,11 @@ class CourseGraph:
             self.previous, self.first,
         )  # fmt: skip
 
+    @property
+    def cells(self) -> SurfacePoints:
+        """The n + k cells as points of faces."""
+        return joined([self.graph.cells, self.points])
+
     @cached_property
     def _by_ends(self) -> tuple[IntArray, IntArray]:
         """The states by their starts and ends, and a number for both, ascending."""
@@ -225,7 +235,8 @@ def with_control_points(
     normals = np.concatenate([cells.normals, nodes.normals])
     corners_of_faces = np.concatenate([cells.corners, surface.mesh.faces[points.faces]])
     places = nicmm_kernels.HopPlaces(n, corners_of_faces, positions, normals)
-    departures = hops_from(surface, places, n, graph.spacing)
+    at = joined([graph.cells, points])
+    departures = hops_from(surface, at, places, n, graph.spacing)
     arrivals, control = departures.reversed, departures.start - n
     hops = joined_hops([graph.hops, departures, arrivals])
     m, d = len(graph.reverse), len(control)

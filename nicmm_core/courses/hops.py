@@ -12,21 +12,24 @@ import nicmm_kernels
 import numpy as np
 
 from ..geometry import tolerances
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
+from ..geometry.tracing import strictly_inside, trace_from
 from ..geometry.vectors import dot, lengths, unit
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface
 
-HOPS = 18
+HOPS = 20
 """Number of hops from a place to its nearest places, before the reverse hops are added."""
 
 REACH = 4.2
 """Greatest length of a hop, in square roots of the area per cell."""
 
-DETOUR = 1.6
-"""Greatest length of the path along edges, relative to the straight way.
+DETOUR = 1.05
+"""Length of the path along edges, relative to the straight way, from which the straight way may
+lead across a hole, an obstacle or a boundary.
 
-A longer path leads around a hole, an obstacle or a boundary, and the straight way across it.
+Along a boundary that turns by less than 60° the path is shorter. There the hop is kept.
 """
 
 
@@ -56,15 +59,21 @@ class Hops:
 
 
 def hops_from(
-    surface: CurveSurface, places: nicmm_kernels.HopPlaces, first: int, spacing: float
+    surface: CurveSurface,
+    at: SurfacePoints,
+    places: nicmm_kernels.HopPlaces,
+    first: int,
+    spacing: float,
 ) -> Hops:
     """Hops from places to the nearest other ones, sorted by their starts.
 
     Parameters
     ----------
     surface : CurveSurface
+    at : SurfacePoints
+        Cells, then control points, as points of faces.
     places : HopPlaces
-        Cells, then control points.
+        The same, as compiled kernels read them.
     first : int
         Index of the first place from which hops are wanted.
     spacing : float
@@ -79,9 +88,29 @@ def hops_from(
     # The bending at a hop without length would be infinite.
     shortest = np.maximum(in_space, tolerances.SAME_POSITION * mesh.diagonal)
     length = np.maximum(lengths(found.leaving.T), shortest)
-    kept = found.distance <= DETOUR * length
-    leaving, arriving = unit(found.leaving[kept].T).T, unit(found.arriving[kept].T).T
-    return Hops(found.start[kept], found.end[kept], length[kept], leaving, arriving)
+    leaving, arriving = unit(found.leaving.T).T, unit(found.arriving.T).T
+    kept = ~_across_boundary(surface, at[found.start], leaving, length, found.distance)
+    return Hops(found.start[kept], found.end[kept], length[kept], leaving[kept], arriving[kept])
+
+
+def _across_boundary(
+    surface: CurveSurface,
+    start: SurfacePoints,
+    direction: FloatArray,
+    length: FloatArray,
+    along_edges: FloatArray,
+) -> BoolArray:
+    """Which straight ways lead across a boundary, although paths along edges lead around it."""
+    mesh, across = surface.mesh, np.zeros(len(length), dtype=bool)
+    if (mesh.face_neighbours >= 0).all():
+        return across
+    around = np.flatnonzero(along_edges > DETOUR * length)
+    begin = start[around]
+    begin = SurfacePoints(begin.faces, strictly_inside(begin.barycentric))
+    _, across[around], _ = trace_from(
+        mesh, begin, direction[around], length[around], surface.folded
+    )
+    return across
 
 
 def in_both_directions(hops: Hops, size: int) -> tuple[Hops, IntArray]:

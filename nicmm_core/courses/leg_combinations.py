@@ -15,7 +15,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import meeting_segments
-from ..geometry.surface_points import SurfacePoints, joined
+from ..geometry.surface_points import SurfacePoints
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from ..relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
@@ -149,7 +149,7 @@ def curves_on_routes(
     along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0).ravel()
     one, other = cells[hop.ravel()], cells[hop.ravel() + 1]
     nearer = along <= 0.5 + tolerances.ROUNDED  # halfway counts as nearer to the first
-    places = _places_of_cells(graph)[np.where(nearer, one, other)]
+    places = graph.cells[np.where(nearer, one, other)]
     taken = state[hop.ravel()]
     leaving, arriving = graph.hops.leaving[taken], graph.hops.arriving[taken]
     direction = np.where(nearer[:, None], leaving, -arriving)
@@ -180,14 +180,6 @@ def _is_end(count: int, paths: list[IntArray]) -> BoolArray:
     ends = np.zeros((len(paths), count), dtype=bool)
     ends[:, [0, -1]] = True
     return ends.ravel()
-
-
-def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
-    """The cells as points on the mesh."""
-    mesh, vertex = graph.graph.surface.mesh, graph.graph.vertex
-    faces = mesh.vertex_faces.indices[mesh.vertex_faces.indptr[vertex]]
-    barycentric = (mesh.faces[faces] == vertex[:, None]).astype(np.float64)
-    return joined([SurfacePoints(faces, barycentric), graph.points])
 
 
 def crossing_legs(curves: LegCurves) -> BoolArray:

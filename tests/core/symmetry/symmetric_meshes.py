@@ -33,7 +33,10 @@ def symmetric_creature(seed, subdivisions=2):
     every = np.concatenate([faces, image[faces][:, ::-1]])
     used, every = np.unique(every, return_inverse=True)
     both = np.concatenate([right, FLIP * right])[used]
-    return nicmm.Mesh(*igl.loop(both, every.reshape(-1, 3), subdivisions))
+    both_faces = every.reshape(-1, 3)
+    # Where both faces of an edge in the plane bend to one side, the edge would have four faces.
+    assert igl.is_edge_manifold(both_faces)[0]
+    return nicmm.Mesh(*igl.loop(both, both_faces, subdivisions))
 
 
 def is_symmetric(mesh):

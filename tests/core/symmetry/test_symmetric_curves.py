@@ -86,8 +86,11 @@ FINE = {
     **{f"creature {seed}": (lambda seed=seed: symmetric_creature(seed, 4)) for seed in range(2)},
     "fine torus": lambda: shapes.torus(around=384, across=192),
 }
+SEEDS = [*range(13), 14]
+"""Seeds of creatures; that of 13 and its mirror image are no manifold."""
+
 COARSE = {
-    **{f"creature {seed}": (lambda seed=seed: symmetric_creature(seed)) for seed in range(14)},
+    **{f"creature {seed}": (lambda seed=seed: symmetric_creature(seed)) for seed in SEEDS},
     "sphere": lambda: shapes.sphere(4),
     "cube": lambda: shapes.cube(8),
     "disc": shapes.disc,
