@@ -89,6 +89,7 @@ def candidates(
             junctions_of_routes(courses, of_order, closed),
             crosses[own, own],
             closed,
+            kinds=[leg.alike.argmax(axis=1) for leg in of_order],
         )
         found = distinct_combinations([leg.alike for leg in of_order], found, share)
         choice.append(own.start + found.choice)

@@ -21,7 +21,7 @@ from ..relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.even_nodes import resampled
-from .comparison import SAME_COURSE
+from .comparison import PARTS_APART, SAME_COURSE
 from .course_candidates import candidates
 from .hop_graph import HopGraph, with_control_points
 from .leg_orders import legs_of_order
@@ -49,17 +49,20 @@ class SearchSize:
     finalists : int
         The best of all, which are relaxed with twice as many nodes, unless they have had enough
         doublings.
+    apart : float
+        Distance, in bounding-box diagonals, up to which two of them count as the same.
     """
 
     candidates: tuple[int, ...]
     recombined: int
     finalists: int
+    apart: float
 
 
-WHOLE = SearchSize((20, 16, 16, 16, 16, 16), 16, 10)
+WHOLE = SearchSize((20, 16, 16, 16, 16, 16), 16, 10, SAME_COURSE)
 """Size of a search for a whole curve."""
 
-PART = SearchSize((16,), 6, 4)
+PART = SearchSize((16,), 6, 4, PARTS_APART)
 """Size of a search for a part of a curve, which has few legs in a given order."""
 
 LENGTH_NOISE = 0.4
@@ -178,13 +181,14 @@ def find_courses(
     nodes, visit, simple = _with_recombined(
         surface, nodes, visit, corners, smoothness, any_order, search_size.recombined
     )
-    best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search_size.finalists]
+    apart = search_size.apart * surface.mesh.diagonal
+    best = np.concatenate(_best(surface, nodes, simple, smoothness, apart))[: search_size.finalists]
     nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
+    for one in np.concatenate(_best(surface, nodes, simple, smoothness, apart)).tolist():
         own, visited = _selected(nodes, visit, np.array([one]))
         yield own, visited, False
         yield *_resampled(surface, own, visited, 2), True
@@ -310,15 +314,21 @@ def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatAr
 
 
 def _best(
-    surface: CurveSurface, nodes: Nodes, simple: BoolArray, smoothness: float
+    surface: CurveSurface, nodes: Nodes, simple: BoolArray, smoothness: float, apart: float
 ) -> tuple[IntArray, IntArray]:
-    """Distinct courses by ascending energy: the simple ones, and those that cross themselves."""
+    """Distinct courses by ascending energy: the simple ones, and those that cross themselves.
+
+    On a thin part, a course that crosses itself may run beside a simple one.
+    """
     energy = _energies(surface, nodes, smoothness)
-    order = nicmm_kernels.distinct_curves(
-        np.ascontiguousarray(nodes.positions).reshape(nodes.curves, -1, 3),
-        np.argsort(energy, kind="stable"),
-        SAME_COURSE * surface.mesh.diagonal,
-        checkpoint,
-    )
-    simple = simple[order]
-    return order[simple], order[~simple]
+    positions = np.ascontiguousarray(nodes.positions).reshape(nodes.curves, -1, 3)
+
+    def distinct(courses: IntArray) -> IntArray:
+        by_energy = courses[np.argsort(energy[courses], kind="stable")]
+        chosen = nicmm_kernels.distinct_curves(
+            positions[by_energy], np.arange(len(by_energy)), apart, checkpoint
+        )
+        found: IntArray = by_energy[chosen]
+        return found
+
+    return distinct(np.flatnonzero(simple)), distinct(np.flatnonzero(~simple))

@@ -51,7 +51,7 @@ CROSSING = 0.1
 Crossings are not forbidden, since `uncrossing` may remove them.
 """
 
-BEAM_WIDTH = 3_000
+BEAM_WIDTH = 1_000
 """Number of incomplete combinations kept after each leg."""
 
 
@@ -224,8 +224,13 @@ def cheapest_combinations(
     junctions: list[FloatArray],
     crosses: BoolArray,
     closed: bool,
+    kinds: list[IntArray] | None = None,
 ) -> Combinations:
     """Find the cheapest combinations of curves by beam search, leg by leg.
+
+    Of several ones with curves of the same kinds, hardly more than the cheapest can become the
+    beginning of the best whole course, since the other legs depend on the last curve and the first
+    one only. So the others are left out, and the combinations that are kept really differ.
 
     Parameters
     ----------
@@ -237,6 +242,9 @@ def cheapest_combinations(
     crosses : (r, r) bool array
         Which curves cross, by their indices among the curves of all legs.
     closed : bool
+    kinds : list of int arrays, optional
+        Kind of each curve of each leg, as a number below the number of curves; those that run
+        beside each other have the same one. If omitted, all are different.
     """
     count = len(costs)
     offset = np.cumsum([0] + [len(cost) for cost in costs])
@@ -244,6 +252,7 @@ def cheapest_combinations(
     of_itself = np.where(np.diagonal(crosses), price, 0.0)
     choice = np.arange(offset[1])[:, None]
     cost = costs[0] + of_itself[: offset[1]]
+    kind = None if kinds is None else kinds[0]  # a number for the kinds of all curves so far
     for number in range(1, count):
         checkpoint()
         here = slice(offset[number], offset[number + 1])
@@ -255,13 +264,29 @@ def cheapest_combinations(
         for earlier in range(number):
             crossed += crosses[:, here].take(choice[:, earlier], axis=0)
         total += price * crossed
+        if kind is not None:
+            total = _least_of_each(total, kind * offset[1] + choice[:, 0])
         best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
         row, curve = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], offset[number] + curve[:, None]], axis=1)
         cost = total.ravel()[best]
+        if kinds is not None and kind is not None:
+            pairs = kind[row] * len(costs[number]) + kinds[number][curve]
+            kind = np.unique(pairs, return_inverse=True)[1]
     ascending = np.argsort(cost, kind="stable")  # the loop does not run for a single leg
     return Combinations(choice[ascending], cost[ascending])
+
+
+def _least_of_each(costs: FloatArray, group: IntArray) -> FloatArray:
+    """Costs, (b, a), that are infinite unless they are the least of a column in a group of rows."""
+    order = np.argsort(group, kind="stable")
+    ordered = costs[order]
+    begins = np.diff(group[order], prepend=-1) > 0
+    least = np.minimum.reduceat(ordered, np.flatnonzero(begins), axis=0)
+    result = np.empty_like(costs)
+    result[order] = np.where(ordered <= least[np.cumsum(begins) - 1], ordered, np.inf)
+    return result
 
 
 def _least(values: FloatArray, most: int) -> IntArray:

@@ -27,7 +27,7 @@ ALIGNED = 16
 DIFFERENT = 8
 """Number of further routes of a leg, which run elsewhere."""
 
-ALL_DIRECTIONS, ALL_ROUTES = 1_600, 120
+ALL_DIRECTIONS, ALL_ROUTES = 1_600, 600
 """Caps on the totals of direction pairs and routes over all legs; every leg gets a few anyway."""
 
 MAX_RELATIVE_ROUTE_COST = 8.0

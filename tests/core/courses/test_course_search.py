@@ -55,6 +55,30 @@ def test_combinations_that_cross_cost_more(body):
     assert crossings(found).sum() < crossings(free).sum()
 
 
+def test_only_the_cheapest_combinations_of_the_same_kinds_are_kept(body):
+    """Of each choice of kinds, for one first and one last curve; the others cost no less."""
+    graph = graph_through(body, body.vertices[[5, 100, 700]])
+    routes = routes_through(graph, LEGS, closed=True)
+    costs, junctions = [leg.cost for leg in routes], junctions_of_routes(graph, routes, True)
+    offset = np.cumsum([0] + [len(cost) for cost in costs])
+    kinds = [leg.alike.argmax(axis=1) for leg in routes]
+    crosses = np.zeros((offset[-1], offset[-1]), dtype=bool)
+    every = cheapest_combinations(costs, junctions, crosses, closed=True)
+    found = cheapest_combinations(costs, junctions, crosses, closed=True, kinds=kinds)
+
+    def kinds_of(combinations):
+        own = combinations.choice - offset[:-1]
+        middle = kinds[1][own[:, 1]]
+        return [tuple(each) for each in np.stack([own[:, 0], middle, own[:, 2]], axis=1).tolist()]
+
+    assert len(set(kinds_of(found))) == len(found.choice)
+    assert len(set(kinds_of(every))) < len(every.choice)
+    assert found.cost[0] == every.cost[0]
+    least = dict(zip(kinds_of(found), found.cost, strict=True))
+    for kind, cost in zip(kinds_of(every), every.cost, strict=True):
+        assert least.get(kind, found.cost[-1]) <= cost
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_courses_pass_their_points(body, closed):
