@@ -15,6 +15,7 @@ from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from .hop_graph import CourseGraph
 from .leg_combinations import (
+    MANY_LEGS,
     cheapest_combinations,
     course_nodes,
     crossing_legs,
@@ -89,7 +90,8 @@ def candidates(
             junctions_of_routes(courses, of_order, closed),
             crosses[own, own],
             closed,
-            kinds=[leg.alike.argmax(axis=1) for leg in of_order],
+            # Few legs have enough different combinations without regard to kinds.
+            kinds=[leg.alike.argmax(axis=1) for leg in of_order] if n_legs >= MANY_LEGS else None,
         )
         found = distinct_combinations([leg.alike for leg in of_order], found, share)
         choice.append(own.start + found.choice)

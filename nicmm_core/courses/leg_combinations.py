@@ -51,7 +51,7 @@ CROSSING = 0.1
 Crossings are not forbidden, since `uncrossing` may remove them.
 """
 
-BEAM_WIDTH = 1_000
+BEAM_WIDTH = 3_000
 """Number of incomplete combinations kept after each leg."""
 
 
