@@ -142,6 +142,8 @@ class CourseGraph:
         k control points.
     corners : (k,) bool array
         At which of them a course may turn freely.
+    cells : SurfacePoints
+        The n + k cells as points of faces.
     positions, normals : (n + k, 3) float array
         Positions and unit normals of the cells.
     hops : Hops
@@ -163,6 +165,7 @@ class CourseGraph:
     graph: HopGraph
     points: SurfacePoints
     corners: BoolArray
+    cells: SurfacePoints
     positions: FloatArray
     normals: FloatArray
     hops: Hops
@@ -179,11 +182,6 @@ class CourseGraph:
             len(self.positions), self.hops.start, self.hops.end, self.reverse, self.cost,
             self.previous, self.first,
         )  # fmt: skip
-
-    @property
-    def cells(self) -> SurfacePoints:
-        """The n + k cells as points of faces."""
-        return joined([self.graph.cells, self.points])
 
     @cached_property
     def _by_ends(self) -> tuple[IntArray, IntArray]:
@@ -230,13 +228,13 @@ def with_control_points(
         Weight of the normal curvature, squared.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
-    nodes, cells = nodes_at(surface, points, closed=False), graph.places
-    positions = np.concatenate([cells.positions, nodes.positions])
-    normals = np.concatenate([cells.normals, nodes.normals])
-    corners_of_faces = np.concatenate([cells.corners, surface.mesh.faces[points.faces]])
+    nodes, before = nodes_at(surface, points, closed=False), graph.places
+    positions = np.concatenate([before.positions, nodes.positions])
+    normals = np.concatenate([before.normals, nodes.normals])
+    corners_of_faces = np.concatenate([before.corners, surface.mesh.faces[points.faces]])
     places = nicmm_kernels.HopPlaces(n, corners_of_faces, positions, normals)
-    at = joined([graph.cells, points])
-    departures = hops_from(surface, at, places, n, graph.spacing)
+    cells = joined([graph.cells, points])
+    departures = hops_from(surface, cells, places, n, graph.spacing)
     arrivals, control = departures.reversed, departures.start - n
     hops = joined_hops([graph.hops, departures, arrivals])
     m, d = len(graph.reverse), len(control)
@@ -252,7 +250,9 @@ def with_control_points(
             normals[start], normals[end], positions[end] - positions[start], hops.length
         )
     paths = _best_paths(graph, hops, departures, control, weights, k)
-    return CourseGraph(graph, points, corners, positions, normals, hops, reverse, weights, *paths)
+    return CourseGraph(
+        graph, points, corners, cells, positions, normals, hops, reverse, weights, *paths
+    )
 
 
 def _best_paths(

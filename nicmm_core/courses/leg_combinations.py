@@ -252,7 +252,9 @@ def cheapest_combinations(
     of_itself = np.where(np.diagonal(crosses), price, 0.0)
     choice = np.arange(offset[1])[:, None]
     cost = costs[0] + of_itself[: offset[1]]
-    kind = None if kinds is None else kinds[0]  # a number for the kinds of all curves so far
+    if kinds is None:
+        kinds = [np.arange(len(each)) for each in costs]
+    kind = kinds[0]  # a number for the kinds of all curves so far
     for number in range(1, count):
         checkpoint()
         here = slice(offset[number], offset[number + 1])
@@ -264,16 +266,14 @@ def cheapest_combinations(
         for earlier in range(number):
             crossed += crosses[:, here].take(choice[:, earlier], axis=0)
         total += price * crossed
-        if kind is not None:
-            total = _least_of_each(total, kind * offset[1] + choice[:, 0])
+        total = _least_of_each(total, kind * offset[1] + choice[:, 0])
         best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
         row, curve = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], offset[number] + curve[:, None]], axis=1)
         cost = total.ravel()[best]
-        if kinds is not None and kind is not None:
-            pairs = kind[row] * len(costs[number]) + kinds[number][curve]
-            kind = np.unique(pairs, return_inverse=True)[1]
+        pairs = kind[row] * len(costs[number]) + kinds[number][curve]
+        kind = np.unique(pairs, return_inverse=True)[1]
     ascending = np.argsort(cost, kind="stable")  # the loop does not run for a single leg
     return Combinations(choice[ascending], cost[ascending])
 
