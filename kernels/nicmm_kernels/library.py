@@ -44,6 +44,7 @@ _ERRORS = {
     TOO_SMALL: "an array is too small",
     3: "a value is NaN or infinite",
     4: "a matrix is not positive definite",
+    5: "a cost is negative",
 }
 
 

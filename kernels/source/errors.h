@@ -18,7 +18,8 @@ enum {
     INDEX_OUT_OF_RANGE = 1,
     ARRAY_TOO_SMALL = 2,
     NOT_FINITE = 3,
-    NOT_POSITIVE_DEFINITE = 4
+    NOT_POSITIVE_DEFINITE = 4,
+    NEGATIVE_COST = 5
 };
 
 /* The comparison of unsigned numbers is also true for a negative index. */

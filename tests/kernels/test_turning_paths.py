@@ -67,8 +67,49 @@ def test_of_equal_paths_the_one_through_the_state_of_lowest_index_counts():
 def test_negative_costs_are_refused():
     given = arguments_turning()
     given["weights"][:] = -1.0
-    with pytest.raises(KernelError, match="out of range"):
+    with pytest.raises(KernelError, match="a cost is negative"):
         nicmm_kernels.turning_paths(**given)
+
+
+@pytest.mark.parametrize("spread", [0.0, 3.0, 12.0])
+@pytest.mark.parametrize("seed", range(8))
+def test_paths_do_not_depend_on_the_order_of_states_with_similar_costs(seed, spread):
+    """Costs of very different sizes, some of them equal, so that states are looked at again."""
+    rng = np.random.default_rng(seed)
+    given = arguments_turning(k=2)
+
+    def costs_of(count):
+        return rng.integers(0, 3, count) * 10.0 ** (spread * np.round(rng.uniform(-1, 1, count), 1))
+
+    for name in ("onward", "leaving", "arriving"):
+        given[name][2][:] = costs_of(len(given[name][2]))
+    given["weights"][:] = costs_of(len(given["weights"]))
+    costs, previous, first = nicmm_kernels.turning_paths(**given)
+    one, other, added = arcs_of(given)
+    m, d = (len(given[name][0]) - 1 for name in ("onward", "leaving"))
+    for number in range(2):
+        own = m + np.arange(*given["begins"][number : number + 2])
+        expected = np.full(costs.shape[1], np.inf)
+        expected[own] = given["weights"][own]
+        for _ in range(m + 2):
+            np.minimum.at(expected, other, expected[one] + added)
+        np.testing.assert_array_equal(costs[number], expected)
+        for state in np.flatnonzero(previous[number] >= 0):
+            into = other == state
+            before = one[into][expected[one[into]] + added[into] == expected[state]]
+            chosen = previous[number][state]
+            assert first[number][state] == first[number][chosen]
+            if state >= m + d:  # an arrival
+                assert chosen == before.min()
+            elif (expected[before] < expected[state]).any():
+                assert chosen == before[np.argmin(expected[before])]
+            else:
+                assert chosen in before
+        at = np.flatnonzero(np.isfinite(expected))
+        for _ in range(len(expected)):
+            at = at[previous[number][at] >= 0]
+            at = previous[number][at]
+        assert not len(at), "a path has a cycle"
 
 
 def leg_through(graph, leg, state):
