@@ -44,6 +44,7 @@ from .geometry.surface_points import (
     nearest_points,
     snapped,
 )
+from .improvement import Rival
 from .measures import checked_up, measures_of
 from .offsets.curve_offsets import checked_distances, offset_curves
 from .options import OPTIONS
@@ -66,7 +67,7 @@ from .request import Request, same_request
 from .start import WITHOUT_START
 from .status import Status
 from .strokes.feature_lines import feature_line
-from .strokes.stroke_fit import Line, checked_stroke, fitted_points
+from .strokes.stroke_fit import Differs, Line, checked_stroke, fitted_points
 from .symmetry.mirrored_design import mirrored_design
 from .symmetry.symmetric_request import (
     FARTHEST_IMAGE,
@@ -203,6 +204,7 @@ class Designer:
         started: float,
         start: Design | SurfaceCurve | None = None,
         max_iterations: int | None = None,
+        rival: Rival | None = None,
     ) -> Design:
         """The design on the first manifold whose curve can be mapped back to the given mesh.
 
@@ -215,7 +217,8 @@ class Designer:
                 return replace(start, seconds=time.perf_counter() - started)
             begin = None if start is None else start_on(manifold, start)
             with placed(manifold.in_original):
-                found = manifold.designer.design(there, started, begin, max_iterations)
+                found = manifold.designer.design(there, started, begin, max_iterations, rival)
+                rival = None  # it lies on the first manifold
                 try:
                     return manifold.design_on_original(found, request)
                 except NotOnOriginalError as error:
@@ -392,33 +395,43 @@ class Designer:
         """Control points that follow a stroke, for curves with some options."""
         options = {option.name: option.default for option in OPTIONS}
         options |= {"closed": closed, **shape}
-        left = 1.0  # of the progress; each curve takes half of it
+        left = 1.0  # of the progress; each design takes half of it
 
-        def curve_through(points: SurfacePoints, line: Line | None) -> SurfaceCurve | None:
+        def relax_along(points: SurfacePoints, line: Line) -> SurfaceCurve | None:
+            request = self._request(points, checked_options(self.mesh, options))
+            manifold, there = next(self._manifolds(request))
+            found = self._relaxed_along(manifold, there, line)
+            if found is None:
+                return None
+            return only_curve(manifold.design_on_original(found, request), "design")
+
+        def design(points: SurfacePoints, line: Line, differs: Differs) -> SurfaceCurve:
             nonlocal left
             request = self._request(points, checked_options(self.mesh, options))
+            manifold, there = next(self._manifolds(request))
+            rival = None
+            with contextlib.suppress(CurveError, UnreachableError):
+                along = self._relaxed_along(manifold, there, line)
+                if along is not None and along.resumable is not None:
+                    rival = Rival(
+                        along.resumable.curve, lambda curve: differs(manifold.in_original(curve))
+                    )
             with subrange(1.0 - left, 1.0 - 0.5 * left):
-                found = (
-                    self._designed(request, time.perf_counter())
-                    if line is None
-                    else self._relaxed_from(request, line)
-                )
+                found = self._designed(request, time.perf_counter(), rival=rival)
             checkpoint()  # a cancelled design may have an unfinished curve
-            left *= 0.5 if line is None else 1.0
-            return None if found is None else only_curve(found, "design")
+            left *= 0.5
+            return only_curve(found, "design")
 
-        return fitted_points(self.mesh, stroke, tolerance, closed, curve_through)
+        return fitted_points(self.mesh, stroke, tolerance, closed, relax_along, design)
 
-    def _relaxed_from(self, request: Request, line: Line) -> Design | None:
-        """The curve relaxed from a line; None if there is no curve along it."""
-        manifold, there = next(self._manifolds(request))
+    def _relaxed_along(self, manifold: Manifold, there: Request, line: Line) -> Design | None:
+        """The curve on a manifold relaxed from a line; None if there is no curve along it."""
         positions = manifold.from_original(line.positions)
-        begin = manifold.curve_along(positions, request.closed, line.control_index)
+        begin = manifold.curve_along(positions, there.closed, line.control_index)
         if begin is None:
             return None
         with placed(manifold.in_original):
-            found = manifold.designer.design(there, time.perf_counter(), begin)
-        return manifold.design_on_original(found, request)
+            return manifold.designer.design(there, time.perf_counter(), begin)
 
     def measures(
         self,

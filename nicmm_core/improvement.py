@@ -2,7 +2,8 @@
 
 The farther a curve winds around limbs, the more courses a search misses. So if the curve bends,
 the search is repeated with other lengths and other tensions, until two searches have found the same
-curve. Then the parts that bend most are searched for again. If the best curve has kinks, the
+curve. Then the legs of the courses of all searches are combined, and the parts that bend most are
+searched for again. If the best curve has kinks, the
 initial path is tried before these searches, and more tension after them. At last come courses for
 alternatives.
 """
@@ -17,7 +18,10 @@ from dataclasses import dataclass, field, replace
 
 from .courses.bent_part import bent_parts
 from .courses.comparison import distinct_by_energy, is_apart
+from .courses.course_search import COMBINED, Search
+from .courses.course_set import CourseSet
 from .errors import NicmmError
+from .geometry.array_types import FloatArray
 from .relaxation.close_points import bends_like_points
 from .relaxation.curve_energies import energies_of, relative_energies, scaled_bending
 from .relaxation.curve_nodes import CurveSurface
@@ -63,8 +67,8 @@ With normal bending, a loop beside a limb may be found first, and a ring around 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 2
-"""Greatest number of repeated searches for the whole curve. A third one gains hardly anything."""
+FURTHER_SEARCHES = 6
+"""Greatest number of repeated searches for the whole curve."""
 
 COURSES_OF_A_SEARCH = 3
 """Greatest number of courses relaxed after a search whose curves are strongly bent.
@@ -72,7 +76,10 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-SEARCHES_FOR_PARTS = 8
+COMBINED_COURSES = 3
+"""Greatest number of courses relaxed that combine legs of all searches."""
+
+SEARCHES_FOR_PARTS = 4
 """Greatest number of searches for parts of the best curve."""
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
@@ -86,17 +93,18 @@ LEAST_GAIN = 0.02
 """Decrease of the energy, relative to the elastic energy, below which a search has gained nothing.
 """
 
-MOST_WORK = 2_200
+MOST_WORK = 3_300
 """Work of all attempts together above which no further one is begun.
 
 In moves of all nodes. It takes about one second, and two to three on rough meshes.
 """
 
-WORK_OF_SEARCH = 40
+WORK_OF_SEARCH = 30
 """Approximate work of a search, in the same unit; as much again for each control or via point."""
 
 WORK_OF_PART = 100
-"""Approximate work of a search for a part, in the same unit."""
+"""Approximate work of a search for a part, in the same unit, or of combining the courses of all
+searches."""
 
 WORK_OF_TRANSFER = 20
 """Approximate work of transferring a course from the coarse mesh, in the same unit."""
@@ -116,6 +124,25 @@ def relaxation_config(request: Request) -> RelaxationConfig:
     return RelaxationConfig() if request.alignment is None else GUIDED
 
 
+@dataclass(frozen=True)
+class Rival:
+    """A curve through the same control points, which a design may or may not equal in the end.
+
+    Attributes
+    ----------
+    curve : DiscreteCurve
+    differs_from : callable
+        Whether another curve, given by its points, (n, 3), counts as another one.
+    """
+
+    curve: DiscreteCurve
+    differs_from: Callable[[FloatArray], bool]
+
+
+class RivalBeatenError(Exception):
+    """The design cannot equal its rival, since there is a fairer curve."""
+
+
 @dataclass
 class Improvement:
     """The attempts at one curve, each of which relaxes one start.
@@ -128,29 +155,47 @@ class Improvement:
         Relaxes a start with some settings; raises `CancelledError` if the caller stops it.
     transferred_before : int
         Number of courses transferred from the coarse mesh for earlier requests.
+    earlier : list of CourseSet
+        The best courses of all searches so far.
     starts, relaxed : lists of InitialCurve and of Relaxed
         The start and the result of each attempt.
     searches, parts : int
-        Numbers of searches for courses begun so far, of the whole curve and of parts.
+        Numbers of searches begun so far: for courses of the whole curve, and for parts or for
+        combinations of earlier courses.
     path_tried : bool
         Whether the initial path has been tried.
+    rival : Rival, optional
+        The attempts end with `RivalBeatenError` when a fairer curve is found.
     """
 
     search: StartSearch
     request: Request
     relax: Callable[[InitialCurve, RelaxationConfig], Relaxed]
     transferred_before: int
+    earlier: list[CourseSet]
     starts: list[InitialCurve] = field(default_factory=list)
     relaxed: list[Relaxed] = field(default_factory=list)
     searches: int = 1
     parts: int = 0
     path_tried: bool = False
+    rival: Rival | None = None
+    _energies: list[float] = field(default_factory=list)
 
     def attempt(self, start: InitialCurve, config: RelaxationConfig) -> None:
         """Relax a start."""
         relaxed = self.relax(start, config)
         self.starts.append(start)
         self.relaxed.append(relaxed)
+        self._check_rival()
+
+    def _check_rival(self) -> None:
+        """Raise `RivalBeatenError` if the best curve is fairer than the rival and another one."""
+        if self.rival is None:
+            return
+        (theirs,), best = self._energies_of([self.rival.curve]), self.best
+        is_beaten = self.energies[best] < theirs
+        if is_beaten and self.rival.differs_from(self.relaxed[best].curve.points):
+            raise RivalBeatenError
 
     def improve(self, courses: Iterator[InitialCurve], start_kind: StartKind) -> None:
         """Make all attempts that follow the first one.
@@ -166,7 +211,11 @@ class Improvement:
             for alternatives.
         """
         request, self.path_tried = self.request, start_kind is StartKind.PATH
-        further = [self.search.courses(request, seed) for seed in FURTHER_SEEDS]
+        self._check_rival()
+        further = [
+            self.search.courses(request, Search(seed=seed, earlier=self.earlier))
+            for seed in FURTHER_SEEDS
+        ]
         if start_kind is not StartKind.CLOSE_POINTS or not bends_like_points(self.curves[0]):
             self._search_further(courses, further, start_kind)
         if self._should_tighten():
@@ -184,7 +233,7 @@ class Improvement:
         further: list[Iterator[InitialCurve]],
         start_kind: StartKind,
     ) -> None:
-        """Try the spline, courses of the first search and of further ones, and other parts."""
+        """Try the spline, courses of all searches and their combinations, and other parts."""
         by_course = start_kind is StartKind.COURSE
         if start_kind is StartKind.CLOSE_POINTS:
             self.searches = 0
@@ -200,6 +249,8 @@ class Improvement:
             if found_twice or not self._should_search_again() or not self._try_courses(repeated):
                 break
             found_twice = self._found_same_curve(before)
+        if len(self.earlier) > 1 and self._should_try_another_part():
+            self._try_combined()
         self._try_other_parts()
 
     @property
@@ -256,6 +307,14 @@ class Improvement:
                 break
             self.attempt(start, self._config)
 
+    def _try_combined(self) -> None:
+        """Try the best combinations of legs of the courses of all searches."""
+        self.parts += 1
+        courses = self.search.courses(self.request, Search(COMBINED, earlier=self.earlier))
+        new = (start for start in courses if is_new(start, [self.curves[self.best]]))
+        for start in itertools.islice(new, COMBINED_COURSES):
+            self.attempt(start, self._config)
+
     def _try_other_parts(self) -> None:
         """Try the best curve with other courses in the parts that bend most."""
         changed = self.best
@@ -289,8 +348,13 @@ class Improvement:
         The length of the first curve is the scale of all of them. So the order of two curves does
         not depend on later ones, and a further attempt never leads to a worse result.
         """
+        new = self.curves[len(self._energies) :]
+        self._energies += self._energies_of(new)
+        return self._energies
+
+    def _energies_of(self, curves: list[DiscreteCurve]) -> list[float]:
         scale = self.curves[0].length
-        return energies_of(self._surface, self.curves, self.request.smoothness, scale)
+        return energies_of(self._surface, curves, self.request.smoothness, scale)
 
     @property
     def best(self) -> int:
@@ -302,7 +366,7 @@ class Improvement:
         scale = self.curves[0].length
         return relative_energies(self._surface, self.curves, self.request.smoothness, scale)
 
-    def by_energy(self) -> list[int]:
+    def by_energy(self) -> Iterator[int]:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self._surface, self.curves, self.energies)
 
@@ -313,9 +377,9 @@ class Improvement:
     def _is_promising(self, start: InitialCurve) -> bool:
         """Whether a start, if relaxed, may become better than the best curve."""
         assert isinstance(start.curve, DiscreteCurve)
-        curves, scale = [self.curves[self.best], start.curve], self.curves[0].length
-        least, energy = energies_of(self._surface, curves, self.request.smoothness, scale)
-        return energy - least <= PROMISING * self._elastic_energy(curves[0])
+        (energy,) = self._energies_of([start.curve])
+        least = self.energies[self.best]
+        return energy - least <= PROMISING * self._elastic_energy(self.curves[self.best])
 
     def _gained_since(self, before: int) -> bool:
         """Whether the results from an index on are clearly better than those before."""
@@ -347,7 +411,7 @@ class Improvement:
         )
 
     def _should_try_another_part(self) -> bool:
-        """Whether another search for a part of the best curve is worthwhile and affordable."""
+        """Whether other courses of parts of the best curve are worthwhile and affordable."""
         promising = self._bending > self._bound(BENT)
         return promising and self._is_affordable(WORK_OF_PART + self._reserved)
 

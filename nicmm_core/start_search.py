@@ -16,7 +16,7 @@ import numpy as np
 from .coarsening.coarse_start import CoarseStarts
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import PARTS_APART, is_apart
-from .courses.course_search import PART, WHOLE, SearchSize
+from .courses.course_search import PART, Search
 from .courses.course_surface import Course, CourseSurface, joined_courses
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
@@ -139,19 +139,15 @@ class StartSearch:
         return bool((angles <= GREATEST_TURN).all())
 
     def courses(
-        self,
-        request: Request,
-        seed: int = 0,
-        insist: bool = False,
-        search_size: SearchSize = WHOLE,
+        self, request: Request, search: Search | None = None, insist: bool = False
     ) -> Iterator[InitialCurve]:
-        """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
+        """Courses that are simple on the mesh, the best first.
 
         The search ends after `MOST_FAILURES` courses in a row that are not simple. If it is to
         insist, these count only after the first simple course.
         """
         failures, found = 0, not insist
-        for start in self._joined_courses(request, seed, search_size):
+        for start in self._joined_courses(request, search or Search()):
             if start is not None:
                 failures, found = 0, True
                 yield start
@@ -169,7 +165,7 @@ class StartSearch:
         """
         known = [curve]
         part_request = request_for_part(request, curve, part)
-        for course in self.courses(part_request, search_size=PART):
+        for course in self.courses(part_request, Search(PART)):
             assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
             if changed is not None and is_apart(start.surface, changed, known, PARTS_APART):
@@ -193,7 +189,7 @@ class StartSearch:
         """
         surface, new = self.surface.of(request), [i for i, leg in enumerate(legs) if leg.is_new]
         asked = [request_for_leg(surface, curve, legs, number, request) for number in new]
-        found = [self.courses(of_leg, search_size=PART) for of_leg, _ in asked]
+        found = [self.courses(of_leg, Search(PART)) for of_leg, _ in asked]
         for courses in zip(*found, strict=False):
             own = {}
             for number, (_, passed), course in zip(new, asked, courses, strict=True):
@@ -231,13 +227,11 @@ class StartSearch:
             return None
         return InitialCurve(curve.with_corners(corners), visited, surface, self.surface.unit)
 
-    def _joined_courses(
-        self, request: Request, seed: int, search_size: SearchSize
-    ) -> Iterator[InitialCurve | None]:
+    def _joined_courses(self, request: Request, search: Search) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
         mapped, unit = self.surface.of(request), self.surface.unit
         if self._coarse_starts.is_large:
-            for found in self._coarse_starts.courses(request, seed, search_size):
+            for found in self._coarse_starts.courses(request, search):
                 self.transferred += 1
                 yield None if found is None else InitialCurve(*found, mapped, unit)
             return
@@ -253,7 +247,7 @@ class StartSearch:
             )
             return None if curve is None else InitialCurve(curve, course.visited, mapped, unit)
 
-        yield from joined_courses(self._courses.courses(request, seed, search_size), join)
+        yield from joined_courses(self._courses.courses(request, search), join)
 
     @cached_property
     def _courses(self) -> CourseSurface:

@@ -6,6 +6,7 @@ This is the pipeline of a checked request; `design` is its entry point.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import time
 from dataclasses import replace
 from functools import partial
@@ -13,13 +14,15 @@ from functools import partial
 import numpy as np
 
 from .continued import ContinuedCurve, chosen, has_detour
+from .courses.course_search import Search
+from .courses.course_set import CourseSet
 from .design_result import Design
 from .errors import CurveError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
-from .improvement import Improvement, relaxation_config
+from .improvement import Improvement, Rival, RivalBeatenError, relaxation_config
 from .mapped_surface import MappedSurface
 from .new_legs import Leg, legs_of, may_need_search, widened
 from .progress import CancelledError, checkpoint, subrange
@@ -87,6 +90,7 @@ class SurfaceDesigner:
         started: float,
         start: Resumable | SurfaceCurve | None = None,
         max_iterations: int | None = None,
+        rival: Rival | None = None,
     ) -> Design:
         """Design a curve.
 
@@ -99,6 +103,8 @@ class SurfaceDesigner:
             A curve on this mesh from which the method "elastic" starts.
         max_iterations : int, optional
             Limit on the total number of iterations of the relaxation.
+        rival : Rival, optional
+            The search ends with the first curve that is fairer than this one and not the same.
 
         Raises
         ------
@@ -110,7 +116,7 @@ class SurfaceDesigner:
         if request.method == "elastic":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
-            return self._designed(request, max_iterations, started)
+            return self._designed(request, max_iterations, started, rival)
         from .paper.level_set_design import level_set_design  # only the other methods need it
 
         return level_set_design(self.mesh, request, started)
@@ -198,20 +204,23 @@ class SurfaceDesigner:
             if len(tried) == TRIED:
                 break
 
-    def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
+    def _designed(
+        self, request: Request, max_iterations: int | None, started: float, rival: Rival | None
+    ) -> Design:
         """Relax the best course, or the initial path if no course is found."""
         if request.mirror is not None:
             return self._designed_symmetric(request, max_iterations, started)
-        curves, cancelled = self._curves(request, max_iterations)
+        curves, cancelled = self._curves(request, max_iterations, rival)
         return self._with_alternatives(request, curves, cancelled, started)
 
     def _curves(
-        self, request: Request, max_iterations: int | None
+        self, request: Request, max_iterations: int | None, rival: Rival | None = None
     ) -> tuple[list[ComparedCurve], bool]:
-        """Distinct curves by ascending energy, and whether the search was cancelled."""
+        """The best distinct curves by energy, and whether the search was cancelled."""
         search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
-            courses = search.courses(request, insist=True)
+            found: list[CourseSet] = []
+            courses = search.courses(request, Search(earlier=found), insist=True)
             start, kind = search.first(request, courses)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
@@ -223,17 +232,21 @@ class SurfaceDesigner:
                 request,
                 partial(_relaxed_unless_cancelled, request),
                 before,
+                found,
                 [start],
                 [first],
+                rival=rival,
             )
             try:
-                improvement.improve(courses, kind)
+                with contextlib.suppress(RivalBeatenError):  # no better curve is needed
+                    improvement.improve(courses, kind)
             except CancelledError:
                 cancelled = True
         starts, relaxed = improvement.starts, improvement.relaxed
         energies = improvement.relative_energies()
-        found = [(starts[i], relaxed[i], energies[i]) for i in improvement.by_energy()]
-        return found, cancelled
+        most = (1 if request.mirror is None else MOST_CANDIDATES) + request.alternatives
+        by_energy = itertools.islice(improvement.by_energy(), most)
+        return [(starts[i], relaxed[i], energies[i]) for i in by_energy], cancelled
 
     def _designed_symmetric(
         self, request: Request, max_iterations: int | None, started: float

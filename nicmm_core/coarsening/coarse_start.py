@@ -9,7 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ..courses.course_search import WHOLE, SearchSize
+from ..courses.course_search import Search
 from ..courses.course_surface import Course, CourseSurface, edges_crossed, joined_courses
 from ..errors import NicmmError
 from ..geometry.array_types import IntArray
@@ -44,20 +44,19 @@ class CoarseStarts:
         self._copies: dict[int, tuple[Renumbered, CourseSurface]] = {}
 
     def courses(
-        self, request: Request, seed: int = 0, search_size: SearchSize = WHOLE
+        self, request: Request, search: Search
     ) -> Iterator[tuple[DiscreteCurve, IntArray] | None]:
         """Yield the courses on the coarse mesh, the best first, as curves on the fine mesh.
 
         With each comes the order in which it visits the control points. A course that is not simple
-        on the fine mesh is None. There may be no courses where points are close together. `seed`
-        and `search_size` are those of `CourseSurface.courses`.
+        on the fine mesh is None. There may be no courses where points are close together.
         """
         with contextlib.suppress(NicmmError):
             on_coarse = _on_coarse(self._mesh, self._coarse, request)
             copy, surface = self._copy_under(on_coarse.points)
             on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
             join = partial(self._on_fine, request, copy)
-            yield from joined_courses(surface.courses(on_copy, seed, search_size), join)
+            yield from joined_courses(surface.courses(on_copy, search), join)
 
     def _on_fine(
         self, request: Request, copy: Renumbered, course: Course

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -25,13 +25,13 @@ SAMPLES = 500
 
 def distinct_by_energy(
     surface: CurveSurface, curves: Sequence[DiscreteCurve], energies: Sequence[float]
-) -> list[int]:
+) -> Iterator[int]:
     """Indices of curves by ascending energy, without those that equal a curve of less energy."""
-    chosen: list[int] = []
+    chosen: list[DiscreteCurve] = []
     for number in np.argsort(energies, kind="stable").tolist():
-        if is_apart(surface, curves[number], [curves[each] for each in chosen]):
-            chosen.append(number)
-    return chosen
+        if is_apart(surface, curves[number], chosen):
+            chosen.append(curves[number])
+            yield number
 
 
 def is_apart(

@@ -1,7 +1,7 @@
 """Searches for the course of a curve: candidates from the hop graph, relaxed and compared.
 
-Courses are compared by the energy that relaxation minimises, but with one length scale for all of
-them, the length of the shortest course (`elastic_energy.comparable_energies`).
+A search with another seed finds other courses. The legs of the best courses of all searches for a
+curve can be combined at the end.
 """
 
 from __future__ import annotations
@@ -9,24 +9,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import nicmm_kernels
 import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.surface_points import SurfacePoints, joined
+from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import length_factor
 from ..progress import checkpoint, subrange
-from ..relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
-from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
-from ..relaxation.elastic_energy import comparable_energies
-from ..relaxation.even_nodes import resampled
+from ..relaxation.batch_relaxation import BatchConfig
+from ..relaxation.curve_nodes import CurveSurface, Nodes
 from .comparison import PARTS_APART, SAME_COURSE
 from .course_candidates import candidates
+from .course_set import (
+    CourseSet,
+    distinct_courses,
+    energies_of_courses,
+    relaxed,
+    together,
+    uncrossed,
+    with_corners,
+    with_nodes,
+)
 from .hop_graph import HopGraph, with_control_points
 from .leg_orders import legs_of_order
 from .recombination import recombined
-from .uncrossing import remove_crossings
 
 TENSIONS = (2.0, 1.0)
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path.
@@ -65,6 +71,32 @@ WHOLE = SearchSize((20, 16, 16, 16, 16, 16), 16, 10, SAME_COURSE)
 PART = SearchSize((16,), 6, 4, PARTS_APART)
 """Size of a search for a part of a curve, which has few legs in a given order."""
 
+COMBINED = SearchSize((), 32, 10, PARTS_APART)
+"""Size of a search without candidates of its own, which combines the courses of earlier ones."""
+
+COMBINED_OF_A_SEARCH = 20
+"""Greatest number of courses of each search that are combined with those of other searches."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """One of the searches for a curve.
+
+    Attributes
+    ----------
+    size : SearchSize
+    seed : int
+        Seed of random factors of the lengths in the hop graph, which give other courses; 0 for no
+        factors. Searches with different seeds also have different numbers of cells.
+    earlier : list of CourseSet, optional
+        The best courses of earlier searches for the same curve. This search appends its own.
+    """
+
+    size: SearchSize = WHOLE
+    seed: int = 0
+    earlier: list[CourseSet] | None = None
+
+
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
 
@@ -99,10 +131,7 @@ OF_DOUBLED = (BatchConfig(iterations=6),)
 OF_RECOMBINED = (BatchConfig(iterations=8),)
 OF_FINALISTS = (BatchConfig(iterations=6), BatchConfig(iterations=8))
 """Passes of the joint relaxation of all candidates, of candidates with twice as many nodes, of
-recombined courses, and of the finalists.
-
-Before each pass but the first, nodes are placed evenly along the traces. While nodes move, only
-their distances count, which are too short around the edges of thin parts."""
+recombined courses, and of the finalists."""
 
 
 def find_courses(
@@ -115,8 +144,7 @@ def find_courses(
     closed: bool,
     smoothness: float,
     any_order: bool,
-    seed: int = 0,
-    search_size: SearchSize = WHOLE,
+    search: Search | None = None,
 ) -> Iterator[tuple[Nodes, IntArray, bool]]:
     """Yield relaxed courses through points, by ascending energy, simple ones first.
 
@@ -145,87 +173,116 @@ def find_courses(
     any_order : bool
         Whether a course may visit the control points in another order, to avoid crossing itself or
         because it is cheaper.
-    seed : int
-        Seed of random factors of the lengths in the graph, which give other courses; 0 for no
-        factors.
-    search_size : SearchSize
+    search : Search, optional
+        The first search for a whole curve if omitted.
     """
+    search = search or Search()
     legs = legs_of_order(np.arange(len(points)), closed)
     if len(legs) > MOST_LEGS:
         return
     size = len(surface.mesh.vertices)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
-    if seed:
-        waves = random_waves(along[:, :size], graph.spacing, seed)
+    if search.seed:
+        waves = random_waves(along[:, :size], graph.spacing, search.seed)
         factor = np.exp(LENGTH_NOISE * waves) * (1.0 if factor is None else factor)
-    tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
+    tension = TENSIONS[search.seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
     length = float(along[:, size:][legs[:, 0], legs[:, 1]].sum())
-    courses = with_control_points(
+    in_graph = with_control_points(
         graph, points, corners, length, factor, tension, surface.normal_bending
     )
     checkpoint()
-    found = candidates(courses, surface, closed, smoothness, any_order, search_size.candidates)
+    found = candidates(in_graph, surface, closed, smoothness, any_order, search.size.candidates)
     if found is None:
         return
     nodes, point = found
     # Indices of control points do not count via points.
     number = np.append(np.where(fixed, np.cumsum(fixed) - 1, -1), -1)
     corners = corners[fixed]
-    nodes = _with_corners(nodes, number[point], corners)
-    nodes, visit, _ = remove_crossings(surface, nodes, number[point], any_order)
+    visit = number[point]
+    nodes = with_corners(nodes, visit, corners)
+    courses = CourseSet(nodes, visit, np.zeros(nodes.curves, dtype=bool))
+    courses = uncrossed(surface, courses, any_order)
     with subrange(0.4, 0.6):
-        nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
-        nodes, visit, doublings = _resolved(
-            surface, nodes, visit, smoothness, search_size.finalists
-        )
-    nodes, visit, simple = _with_recombined(
-        surface, nodes, visit, corners, smoothness, any_order, search_size.recombined
-    )
-    apart = search_size.apart * surface.mesh.diagonal
-    best = np.concatenate(_best(surface, nodes, simple, smoothness, apart))[: search_size.finalists]
-    nodes, visit = _selected(nodes, visit, best)
-    nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
-    with subrange(0.7, 1.0):
-        nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
-    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    for one in np.concatenate(_best(surface, nodes, simple, smoothness, apart)).tolist():
-        own, visited = _selected(nodes, visit, np.array([one]))
-        yield own, visited, False
-        yield *_resampled(surface, own, visited, 2), True
+        courses = relaxed(surface, courses, smoothness, OF_CANDIDATES)
+        courses = _resolved(surface, courses, smoothness, search.size.finalists)
+    courses = uncrossed(surface, courses, any_order)
+    combined = _combined(surface, courses, corners, smoothness, any_order, search.size.recombined)
+    if combined is not None:
+        courses = together(surface, [courses, combined], corners)
+    if search.earlier is not None:
+        best = distinct_courses(surface, courses, smoothness, SAME_COURSE)
+        search.earlier.append(courses.only(best[:COMBINED_OF_A_SEARCH]))
+    yield from _finalists(surface, courses, smoothness, any_order, search.size)
 
 
-def _with_recombined(
+def combine_courses(
+    earlier: list[CourseSet],
     surface: CurveSurface,
-    nodes: Nodes,
-    visit: IntArray,
+    corners: BoolArray,
+    smoothness: float,
+    any_order: bool,
+) -> Iterator[tuple[Nodes, IntArray, bool]]:
+    """Yield courses made of the legs of courses of earlier searches, as `find_courses` does.
+
+    Parameters
+    ----------
+    earlier : list of CourseSet
+        At least one set.
+    surface : CurveSurface
+        Surface with the maps of the request.
+    corners : (k,) bool array
+        Control points at which courses may turn freely.
+    smoothness : float
+    any_order : bool
+    """
+    courses = together(surface, earlier, corners)
+    most = COMBINED.recombined
+    combined = _combined(surface, courses, corners, smoothness, any_order, most)
+    if combined is not None:
+        yield from _finalists(surface, combined, smoothness, any_order, COMBINED)
+
+
+def _combined(
+    surface: CurveSurface,
+    courses: CourseSet,
     corners: BoolArray,
     smoothness: float,
     any_order: bool,
     most: int,
-) -> tuple[Nodes, IntArray, BoolArray]:
-    """Courses without crossings, and new ones of their legs.
-
-    Also the control point at each node, and which courses are simple.
-    """
-    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    combined = recombined(surface, nodes, visit, simple, smoothness, most)
-    if combined is None:
-        return nodes, visit, simple
-    new, new_visit = combined
-    new = _with_corners(new, new_visit, corners)
-    new, new_visit, _ = remove_crossings(surface, new, new_visit, any_order)
+) -> CourseSet | None:
+    """Relaxed new courses of the legs of given ones; None if there are none."""
+    found = recombined(surface, courses.nodes, courses.visit, courses.simple, smoothness, most)
+    if found is None:
+        return None
+    nodes, visit = found
+    nodes = with_corners(nodes, visit, corners)
+    new = CourseSet(nodes, visit, np.zeros(nodes.curves, dtype=bool), courses.doublings)
+    new = uncrossed(surface, new, any_order)
     with subrange(0.6, 0.7):
-        new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
-    new, new_visit, new_simple = remove_crossings(surface, new, new_visit, any_order)
-    places = joined([nodes.places, new.places])
-    nodes = nodes_at(surface, places, nodes.closed, nodes.curves + new.curves)
-    visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
-    return _with_corners(nodes, visit, corners), visit, simple
+        new = relaxed(surface, new, smoothness, OF_RECOMBINED)
+    return uncrossed(surface, new, any_order)
 
 
-def _with_corners(nodes: Nodes, visit: IntArray, corners: BoolArray) -> Nodes:
-    """The same courses, which may turn freely at some of the control points."""
-    return replace(nodes, corners=(visit >= 0) & corners[visit]) if corners.any() else nodes
+def _finalists(
+    surface: CurveSurface,
+    courses: CourseSet,
+    smoothness: float,
+    any_order: bool,
+    size: SearchSize,
+) -> Iterator[tuple[Nodes, IntArray, bool]]:
+    """Relax the best courses further and yield them; see `find_courses`."""
+    best = distinct_courses(surface, courses, smoothness, size.apart)[: size.finalists]
+    finalists = courses.only(best)
+    times = 2 if finalists.doublings < MOST_DOUBLINGS else 1
+    finalists = with_nodes(surface, finalists, times)
+    with subrange(0.7, 1.0):
+        finalists = relaxed(surface, finalists, smoothness, OF_FINALISTS)
+    finalists = uncrossed(surface, finalists, any_order)
+    for one in distinct_courses(surface, finalists, smoothness, size.apart).tolist():
+        own = finalists.only(np.array([one]))
+        yield own.nodes, own.visit, False
+        finer = with_nodes(surface, own, 2)
+        yield finer.nodes, finer.visit, True
 
 
 def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:
@@ -254,81 +311,27 @@ def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray
     return np.sqrt(2.0 / (WAVES * len(distances))) * waves
 
 
-def _relaxed(
-    surface: CurveSurface,
-    nodes: Nodes,
-    visit: IntArray,
-    smoothness: float,
-    passes: tuple[BatchConfig, ...],
-) -> tuple[Nodes, IntArray]:
-    """The curves relaxed in one or more passes, and the control point at each node."""
-    for number, config in enumerate(passes):
-        if number:
-            nodes, visit = _resampled(surface, nodes, visit, 1)
-        with subrange(number / len(passes), (number + 1) / len(passes)):
-            nodes = relax_batch(surface, nodes, visit >= 0, smoothness, config)
-    return nodes, visit
-
-
 def _resolved(
-    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float, n_best: int
-) -> tuple[Nodes, IntArray, int]:
-    """Relaxed courses with as many nodes as their energies need, and how often these were doubled.
+    surface: CurveSurface, courses: CourseSet, smoothness: float, n_best: int
+) -> CourseSet:
+    """Relaxed courses with as many nodes as their energies need.
 
     The median over the `n_best` best courses decides whether nodes are doubled. Then the worst
     courses are left out.
     """
     unpainted = replace(surface, feature_map=None)  # with lanes, energies may be negative
-    for doublings in range(MOST_DOUBLINGS):
-        doubled, visit_doubled = _resampled(surface, nodes, visit, 2)
-        best = np.argsort(_energies(surface, nodes, smoothness), kind="stable")[:n_best]
-        before, after = (_energies(unpainted, each, smoothness) for each in (nodes, doubled))
+    for _ in range(MOST_DOUBLINGS):
+        doubled = with_nodes(surface, courses, 2)
+        energy = energies_of_courses(surface, courses.nodes, smoothness)
+        best = np.argsort(energy, kind="stable")[:n_best]
+        before, after = (
+            energies_of_courses(unpainted, each.nodes, smoothness) for each in (courses, doubled)
+        )
         growth = after[best] / np.maximum(before[best], tolerances.TINY)
         if np.median(growth) < UNDER_RESOLVED:
-            return nodes, visit, doublings
-        most = max(FEWEST_DOUBLED, int(KEPT_WHEN_DOUBLED * nodes.curves))
-        ascending = np.argsort(_energies(surface, doubled, smoothness), kind="stable")
-        kept = np.sort(ascending[:most])
-        doubled, visit_doubled = _selected(doubled, visit_doubled, kept)
-        nodes, visit = _relaxed(surface, doubled, visit_doubled, smoothness, OF_DOUBLED)
-    return nodes, visit, MOST_DOUBLINGS
-
-
-def _resampled(
-    surface: CurveSurface, nodes: Nodes, visit: IntArray, times: int
-) -> tuple[Nodes, IntArray]:
-    """The curves with `times` as many nodes, and the control point at each node."""
-    found, former = resampled(surface, nodes, visit >= 0, times)
-    return found, np.where(former < 0, -1, visit[former])
-
-
-def _selected(nodes: Nodes, visit: IntArray, which: IntArray) -> tuple[Nodes, IntArray]:
-    """Some of the curves, by their indices, and the control point at each node."""
-    return curves_of(nodes, which), nodes.by_curve(visit)[which].ravel()
-
-
-def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:
-    """E of each course, (c,), with the length of the shortest course as the length scale."""
-    shortest = float(nodes.by_curve(nodes.step_lengths).sum(axis=1).min())
-    return comparable_energies(surface, nodes, smoothness, shortest)
-
-
-def _best(
-    surface: CurveSurface, nodes: Nodes, simple: BoolArray, smoothness: float, apart: float
-) -> tuple[IntArray, IntArray]:
-    """Distinct courses by ascending energy: the simple ones, and those that cross themselves.
-
-    On a thin part, a course that crosses itself may run beside a simple one.
-    """
-    energy = _energies(surface, nodes, smoothness)
-    positions = np.ascontiguousarray(nodes.positions).reshape(nodes.curves, -1, 3)
-
-    def distinct(courses: IntArray) -> IntArray:
-        by_energy = courses[np.argsort(energy[courses], kind="stable")]
-        chosen = nicmm_kernels.distinct_curves(
-            positions[by_energy], np.arange(len(by_energy)), apart, checkpoint
-        )
-        found: IntArray = by_energy[chosen]
-        return found
-
-    return distinct(np.flatnonzero(simple)), distinct(np.flatnonzero(~simple))
+            break
+        most = max(FEWEST_DOUBLED, int(KEPT_WHEN_DOUBLED * courses.nodes.curves))
+        energy = energies_of_courses(surface, doubled.nodes, smoothness)
+        kept = np.sort(np.argsort(energy, kind="stable")[:most])
+        courses = relaxed(surface, doubled.only(kept), smoothness, OF_DOUBLED)
+    return courses

@@ -21,7 +21,7 @@ from ..path.visiting_order import shortest_order
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request, mapped_request
-from .course_search import WHOLE, SearchSize, find_courses
+from .course_search import COMBINED, Search, combine_courses, find_courses
 from .hop_graph import SEARCH_CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
@@ -132,9 +132,7 @@ class CourseSurface:
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return MappedSurface(mesh, replace(own, vertex_normals=normals))
 
-    def courses(
-        self, request: Request, seed: int = 0, search_size: SearchSize = WHOLE
-    ) -> Iterator[Course]:
+    def courses(self, request: Request, search: Search | None = None) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
 
         Where strands are close together, traces between more nodes may avoid a crossing.
@@ -142,16 +140,15 @@ class CourseSurface:
         Parameters
         ----------
         request : Request
-        seed : int
-            Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
-            no factors. Searches with different seeds also have different numbers of cells.
-        search_size : SearchSize
+        search : Search, optional
+            The first search for a whole curve if omitted.
 
         Raises
         ------
         ControlPointError, UnreachableError
             If via points coincide with control points or lie on another component.
         """
+        search = search or Search()
         request = _with_rounded_points(self._mesh, request)
         on_refined = self._refined.in_parts(request.points)
         along = distances_along_edges(self._surface.without_maps, on_refined)
@@ -174,19 +171,25 @@ class CourseSurface:
             along = along[visited][:, np.append(np.arange(size), size + visited)]
         if self._has_needles:
             return
-        found = find_courses(
-            self._graph(SEARCH_CELLS[seed % len(SEARCH_CELLS)]),
-            self._with_maps(request),
-            on_refined,
-            along,
-            fixed,
-            corners,
-            request.closed,
-            request.smoothness,
-            any_order=request.order == "shortest" and not request.via_points,
-            seed=seed,
-            search_size=search_size,
-        )
+        surface, any_order = self._with_maps(request), request.order == "shortest"
+        any_order = any_order and not request.via_points
+        if search.size is COMBINED:
+            found = combine_courses(
+                search.earlier or [], surface, corners[fixed], request.smoothness, any_order
+            )
+        else:
+            found = find_courses(
+                self._graph(SEARCH_CELLS[search.seed % len(SEARCH_CELLS)]),
+                surface,
+                on_refined,
+                along,
+                fixed,
+                corners,
+                request.closed,
+                request.smoothness,
+                any_order,
+                search,
+            )
         for nodes, visit, is_finer in found:
             places = self._refined.in_parents(nodes.places)
             control = np.flatnonzero(visit >= 0)

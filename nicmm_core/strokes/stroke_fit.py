@@ -7,9 +7,10 @@ The stroke is smoothed by a spline, and control points are places on it:
 2. They are often more than needed. So with only some of them, a curve is relaxed from the smoothed
    stroke, which is fast and keeps its course. Where it leaves the tolerance, a control point is
    added, until it does not.
-3. The curve through these is designed without a start, as the caller will do. If it takes another
-   course, control points are added there. If that does not help, the first guess is tried instead,
-   and then with further points where lines between them turn much.
+3. The curve through these is designed without a start, as the caller will do. This ends as soon as
+   a curve away from the stroke is fairer than the one along it. Control points are then added where
+   they differ. If that does not help, the first guess is tried instead, and then with further
+   points where lines between them turn much.
 """
 
 from __future__ import annotations
@@ -64,10 +65,14 @@ DENSE = 0.1
 WITHIN = 0.99
 """Greatest distance of a sample, in tolerances; points between samples may be farther away."""
 
+WORST = 0.5
+"""Share of the greatest distance between a curve and the stroke from which control points are
+added. Where the distance is less, the curve often changes with them."""
+
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 4, 2
+MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 6, 2
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
 are designed without a start in each part of the third one; fewer in its last part."""
 
@@ -86,9 +91,15 @@ class Line(NamedTuple):
     control_index: IntArray
 
 
-Curves = Callable[[SurfacePoints, Line | None], SurfaceCurve | None]
-"""Designs the curve through control points, or relaxes it from a line if there is a curve along it.
-"""
+RelaxAlong = Callable[[SurfacePoints, Line], SurfaceCurve | None]
+"""Relaxes the curve through control points from a line; None if there is no curve along it."""
+
+Differs = Callable[[FloatArray], bool]
+"""Whether a curve, given by its points, (n, 3), leaves the stroke."""
+
+DesignCurve = Callable[[SurfacePoints, Line, Differs], SurfaceCurve]
+"""Designs the curve through control points, or finds one that differs and is fairer than the one
+along the line."""
 
 
 def checked_stroke(
@@ -135,7 +146,12 @@ def checked_stroke(
 
 
 def fitted_points(
-    mesh: Mesh, stroke: FloatArray, tolerance: float, closed: bool, design: Curves
+    mesh: Mesh,
+    stroke: FloatArray,
+    tolerance: float,
+    closed: bool,
+    relax_along: RelaxAlong,
+    design: DesignCurve,
 ) -> SurfacePoints:
     """Few control points whose curve stays within the tolerance of a stroke.
 
@@ -147,8 +163,8 @@ def fitted_points(
     tolerance : float
         In mesh units.
     closed : bool
-    design : callable
-        Designs the curve through control points, or relaxes it from a line; see `Curves`.
+    relax_along, design : callable
+        See `RelaxAlong` and `DesignCurve`.
 
     Raises
     ------
@@ -168,7 +184,7 @@ def fitted_points(
     for places in _smoothed_lines(stroke, tolerance, closed):
         on_surface = nearest_points(mesh, places)[0]
         normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
-        fit = _Fit(mesh, places, normals, samples, tolerance, closed, design)
+        fit = _Fit(mesh, places, normals, samples, tolerance, closed, relax_along, design)
         guess = _fewest_knots(places, normals, tolerance, closed)
         most = max(MOST_POINTS, 2 * len(guess))
         found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
@@ -196,7 +212,8 @@ class _Fit:
     stroke: FloatArray
     tolerance: float
     closed: bool
-    design: Curves
+    relax_along: RelaxAlong
+    design: DesignCurve
 
     def points(self, knots: IntArray) -> SurfacePoints:
         """The points of the surface at knots, which are indices of places."""
@@ -219,12 +236,14 @@ class _Fit:
             checkpoint()
             if len(knots) > most:
                 return None
-            curve = None
+            curve, line = None, Line(self.places, knots)
             # Two of the points may coincide, or lie on different parts.
             with contextlib.suppress(ControlPointError, UnreachableError, CurveError):
-                line = Line(self.places, knots) if along else None
-                curve = self.design(self.points(knots), line)
-            missing = np.arange(0) if curve is None else self.missing(knots, curve)
+                if along:
+                    curve = self.relax_along(self.points(knots), line)
+                else:
+                    curve = self.design(self.points(knots), line, self.differs)
+            missing = np.arange(0) if curve is None else self.missing(knots, curve.points)
             if curve is not None and not len(missing):
                 return knots
             finer = knots
@@ -255,18 +274,25 @@ class _Fit:
                 return knots
             knots = np.union1d(knots, gaps.sum(axis=0) // 2 % m)
 
-    def missing(self, knots: IntArray, curve: SurfaceCurve) -> IntArray:
-        """The places between knots where a curve is too far from the stroke, the worst first.
+    def differs(self, curve: FloatArray) -> bool:
+        """Whether a curve, (n, 3), is too far from the stroke somewhere."""
+        return bool((self._away(curve)[1] > WITHIN * self.tolerance).any())
 
-        There is at most one between any two knots.
+    def _away(self, curve: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points of the stroke and of a curve, (m, 3), and their distances from the other, (m,)."""
+        line = _sampled(curve, self.tolerance, self.closed)
+        away = cKDTree(line).query(self.stroke)[0], cKDTree(self.stroke).query(line)[0]
+        return np.concatenate([self.stroke, line]), np.concatenate(away)
+
+    def missing(self, knots: IntArray, curve: FloatArray) -> IntArray:
+        """The places between knots where a curve is farthest from the stroke, the worst first.
+
+        There is none if it is near the stroke everywhere, and at most one between any two knots.
         Distances count from the curve to the stroke and from the stroke to the curve.
         """
-        line = _sampled(curve.points, self.tolerance, curve.closed)
-        both = np.concatenate([self.stroke, line])
-        away = np.concatenate(
-            [cKDTree(line).query(self.stroke)[0], cKDTree(self.stroke).query(line)[0]]
-        )
-        far = np.flatnonzero(away > WITHIN * self.tolerance)
+        both, away = self._away(curve)
+        limit = max(WITHIN * self.tolerance, WORST * float(away.max()))
+        far = np.flatnonzero(away > limit)
         far = far[np.argsort(-away[far], kind="stable")]
         place = cKDTree(self.places).query(both[far])[1]
         gap = np.searchsorted(knots, place, side="right")

@@ -271,7 +271,7 @@ def best_symmetric(
         if found[1].status is Status.CANCELLED:
             break
     curves = [each.discrete_curve for each in relaxed]
-    order = distinct_by_energy(starts[0].surface, curves, energies)
+    order = list(distinct_by_energy(starts[0].surface, curves, energies))
     relative = relative_energies(starts[0].surface, curves, request.smoothness, scale)
     cancelled = relaxed[-1].status is Status.CANCELLED
     return [(starts[i], relaxed[i], relative[i]) for i in order], cancelled

@@ -8,6 +8,7 @@ from nicmm_kernels import threads
 
 import nicmm_core as nicmm
 from nicmm_core import improvement, shapes, start_search, surface_designer
+from nicmm_core.courses.course_search import WHOLE
 from nicmm_core.path import legs, simple_path, virtual_splits
 from nicmm_core.relaxation import relaxing
 from tests.oracles.checker import judge
@@ -117,9 +118,10 @@ def test_repeated_searches_are_bounded(monkeypatch):
     searched = []
     seek = start_search.StartSearch.courses
 
-    def counted(self, request, seed=0, **named):
-        searched.append(seed)  # runs when the generator is first advanced
-        yield from seek(self, request, seed, **named)
+    def counted(self, request, search, **named):
+        if search.size is WHOLE:
+            searched.append(search.seed)  # runs when the generator is first advanced
+        yield from seek(self, request, search, **named)
 
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)
@@ -130,11 +132,10 @@ def test_repeated_searches_are_bounded(monkeypatch):
     nicmm.design_curve(body, chosen)
     assert searched == [0, 1]
     searched.clear()
-    monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(improvement, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(improvement, "is_apart", lambda *curves: True)
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(6))
+    assert searched == [0, *improvement.FURTHER_SEEDS]
     searched.clear()
     monkeypatch.setattr(improvement, "is_apart", lambda *curves: False)  # searches agree
     nicmm.design_curve(body, chosen)

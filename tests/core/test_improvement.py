@@ -11,6 +11,7 @@ from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points, snapped
 from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
+from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import random_surface_points
 from tests.oracles.energies import named_requests
 
@@ -72,7 +73,7 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
     def energies(count):
         search, request = start_search.StartSearch(ball), curves[0].request
         return improvement.Improvement(
-            search, request, None, 0, [start] * count, results[:count]
+            search, request, None, 0, [], [start] * count, results[:count]
         ).energies
 
     assert energies(3)[:2] == energies(2)
@@ -135,11 +136,37 @@ def test_a_curve_that_bends_like_a_circle_is_searched_for_again(flat_disc, monke
     seeds = []
     courses = start_search.StartSearch.courses
 
-    def spy(search, request, seed=0, *given, **named):
-        seeds.append(seed)  # when the first course is asked for
-        yield from courses(search, request, seed, *given, **named)
+    def spy(self, request, search, **named):
+        seeds.append(search.seed)  # when the first course is asked for
+        yield from courses(self, request, search, **named)
 
     monkeypatch.setattr(start_search.StartSearch, "courses", spy)
     square = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.0, -0.5, 0.0]]
     nicmm.design_curve(flat_disc, square, normal_bending=weight)
     assert seeds[:2] == [0, 1]
+
+
+@pytest.mark.parametrize("differs", [True, False])
+def test_a_design_ends_when_a_rival_is_beaten_by_another_curve(monkeypatch, differs):
+    """Otherwise it is the same as without a rival."""
+    attempts = []
+    attempt = improvement.Improvement.attempt
+    monkeypatch.setattr(
+        improvement.Improvement,
+        "attempt",
+        lambda self, *given: attempts.append(given) or attempt(self, *given),
+    )
+    asked = REQUESTS[BENT[0]]
+    there = nicmm.Designer(asked.mesh).design(asked.points, **asked.options).resumable
+    designer, request = SurfaceDesigner(there.mesh), there.request
+    attempts.clear()
+    whole = designer.design(request, 0.0)
+    number = len(attempts)
+    attempts.clear()
+    worse = designer.design(request, 0.0, max_iterations=0).resumable
+    rival = improvement.Rival(worse.curve, lambda points: differs)
+    found = designer.design(request, 0.0, rival=rival)
+    assert number > 0
+    assert len(attempts) == (0 if differs else number)
+    if not differs:
+        np.testing.assert_array_equal(found.curves[0].points, whole.curves[0].points)

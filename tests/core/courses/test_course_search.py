@@ -8,6 +8,7 @@ from nicmm_core import shapes
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.courses.course_search import find_courses, random_waves
+from nicmm_core.courses.course_set import CourseSet, energies_of_courses, with_nodes
 from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
 from nicmm_core.courses.leg_combinations import (
     CROSSING,
@@ -145,17 +146,18 @@ def test_nodes_are_doubled_until_energies_are_true(windings, doubled):
     visit = np.full(count, -1)
     visit[0] = 0
 
-    def growth(nodes, visit):
+    def growth(courses):
         """Of the energy, with twice as many nodes along the traces."""
-        twice, _ = course_search._resampled(surface, nodes, visit, 2)
-        before, after = (course_search._energies(surface, each, 1.0) for each in (nodes, twice))
+        both = courses, with_nodes(surface, courses, 2)
+        before, after = (energies_of_courses(surface, each.nodes, 1.0) for each in both)
         return after[0] / before[0]
 
-    assert (growth(nodes, visit) > course_search.UNDER_RESOLVED) == doubled
-    found, visit, doublings = course_search._resolved(surface, nodes, visit, 1.0, 1)
-    assert (doublings > 0) == doubled
-    assert found.per_curve == count * 2**doublings
-    assert growth(found, visit) < course_search.UNDER_RESOLVED
+    courses = CourseSet(nodes, visit, np.ones(1, dtype=bool))
+    assert (growth(courses) > course_search.UNDER_RESOLVED) == doubled
+    found = course_search._resolved(surface, courses, 1.0, 1)
+    assert (found.doublings > 0) == doubled
+    assert found.nodes.per_curve == count * 2**found.doublings
+    assert growth(found) < course_search.UNDER_RESOLVED
 
 
 @pytest.mark.slow

@@ -92,7 +92,9 @@ def test_points_values_and_curves_are_mapped(surface):
     np.testing.assert_array_equal(again.barycentric, curve.barycentric)
 
 
-@pytest.mark.parametrize("width, resolution", [(1.0, 1e-7), (1e-7, 1e-9), (1e-9, None)])
+@pytest.mark.parametrize(
+    "width, resolution", [(1.0, 1e-6), (1e-5, 1e-7), (1e-7, 1e-9), (1e-9, None)]
+)
 def test_coordinates_are_rounded_as_coarsely_as_needles_allow(width, resolution):
     vertices = np.array(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1.0, width, 0.2 * width], [0.5, 0.5, 0.3]]

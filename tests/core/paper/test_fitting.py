@@ -216,7 +216,7 @@ def test_points_of_a_great_circle_give_a_great_circle(ball, network, closed):
     problem = build_problem(ball, points, closed=closed)
     result = fit(network, problem, WEIGHTS)
     curve = assert_one_curve(ball, problem, result.field, ball.vertices[chosen], closed)
-    assert np.abs(curve.points[:, 2]).max() < 0.03
+    assert np.abs(curve.points[:, 2]).max() < 0.04
     assert result.terms["smooth"] < 0.05 * energy_of(problem, problem.initial_distance)["smooth"]
 
 
