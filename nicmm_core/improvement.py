@@ -44,7 +44,8 @@ Curves above it may wind around limbs, where a search misses more courses.
 """
 
 BENT = 15.0
-"""L ∮ κ_g² ds above which the parts that bend most are searched for again."""
+"""L ∮ κ_g² ds above which courses of all searches are combined, and the parts that bend most are
+searched for again."""
 
 STRONGLY_BENT = 20.0
 """L ∮ κ_g² ds above which further courses of a search follow; a circle has 4π², about 40."""
@@ -96,7 +97,7 @@ LEAST_GAIN = 0.02
 MOST_WORK = 3_300
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes. It takes about one second, and two to three on rough meshes.
+In moves of all nodes. It takes one to two seconds, and more than three on rough meshes.
 """
 
 WORK_OF_SEARCH = 30
