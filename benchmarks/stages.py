@@ -24,7 +24,7 @@ from nicmm_core import (
     surface_designer,
 )
 from nicmm_core.coarsening import coarse_start
-from nicmm_core.courses import course_candidates, course_search, course_surface
+from nicmm_core.courses import course_candidates, course_search, course_set, course_surface
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 
@@ -79,9 +79,13 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
         (course_candidates, "course_nodes"),
     ],
     "legs recombined": [(course_search, "recombined")],
-    "crossings removed": [(course_search, "remove_crossings")],
-    "courses relaxed together": [(course_search, "relax_batch")],
-    "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
+    "crossings removed": [(course_set, "remove_crossings")],
+    "courses relaxed together": [(course_set, "relax_batch")],
+    "courses compared, denser": [
+        (course_search, "distinct_courses"),
+        (course_search, "with_nodes"),
+        (course_set, "with_nodes"),
+    ],
     "course traced": [(start_search, "simple_curve")],
     "initial path": [(start_search, "find_initial_path")],
     "mapping to the fine mesh": [(coarse_start, "nodes_on_fine_mesh")],

@@ -190,10 +190,10 @@ def test_points_are_added_and_inserted_on_curves(empty_scene, first):
     panel = bpy.context.scene.nicmm_curves
     panel.closed, panel.avoid_others, panel.clearance = False, True, CLEARANCE
     scenes.activate(first)
-    call("add_point", position=on(first, ring([110.0], [0.5]))[0])
+    call("add_point", position=on(first, ring([110.0], [0.6]))[0])
     second = bpy.context.active_object
     second.name = "Second"
-    call("add_point", position=on(first, ring([150.0], [0.5]))[0])
+    call("add_point", position=on(first, ring([150.0], [0.6]))[0])
     call("add_point", position=place_on(empty_scene, "First", 2))
     assert [each[:2] for each in junctions("Second")] == [(2, "First")]
     assert_on(empty_scene, "Second", 2)
