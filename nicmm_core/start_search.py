@@ -16,7 +16,7 @@ import numpy as np
 from .coarsening.coarse_start import CoarseStarts
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import PARTS_APART, is_apart
-from .courses.course_search import PART, Search
+from .courses.course_search import FIRST, PART, Search
 from .courses.course_surface import Course, CourseSurface, joined_courses
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
@@ -139,7 +139,7 @@ class StartSearch:
         return bool((angles <= GREATEST_TURN).all())
 
     def courses(
-        self, request: Request, search: Search | None = None, insist: bool = False
+        self, request: Request, search: Search = FIRST, insist: bool = False
     ) -> Iterator[InitialCurve]:
         """Courses that are simple on the mesh, the best first.
 
@@ -147,7 +147,7 @@ class StartSearch:
         insist, these count only after the first simple course.
         """
         failures, found = 0, not insist
-        for start in self._joined_courses(request, search or Search()):
+        for start in self._joined_courses(request, search):
             if start is not None:
                 failures, found = 0, True
                 yield start

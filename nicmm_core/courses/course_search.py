@@ -97,6 +97,10 @@ class Search:
     earlier: list[CourseSet] | None = None
 
 
+FIRST = Search()
+"""The first search for a whole curve."""
+
+
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
 
@@ -144,7 +148,7 @@ def find_courses(
     closed: bool,
     smoothness: float,
     any_order: bool,
-    search: Search | None = None,
+    search: Search = FIRST,
 ) -> Iterator[tuple[Nodes, IntArray, bool]]:
     """Yield relaxed courses through points, by ascending energy, simple ones first.
 
@@ -173,10 +177,8 @@ def find_courses(
     any_order : bool
         Whether a course may visit the control points in another order, to avoid crossing itself or
         because it is cheaper.
-    search : Search, optional
-        The first search for a whole curve if omitted.
+    search : Search
     """
-    search = search or Search()
     legs = legs_of_order(np.arange(len(points)), closed)
     if len(legs) > MOST_LEGS:
         return
@@ -209,10 +211,10 @@ def find_courses(
     combined = _combined(surface, courses, corners, smoothness, any_order, search.size.recombined)
     if combined is not None:
         courses = together(surface, [courses, combined], corners)
+    best = courses.only(distinct_courses(surface, courses, smoothness, search.size.apart))
     if search.earlier is not None:
-        best = distinct_courses(surface, courses, smoothness, SAME_COURSE)
-        search.earlier.append(courses.only(best[:COMBINED_OF_A_SEARCH]))
-    yield from _finalists(surface, courses, smoothness, any_order, search.size)
+        search.earlier.append(best.only(np.arange(len(best.simple))[:COMBINED_OF_A_SEARCH]))
+    yield from _finalists(surface, best, smoothness, any_order, search.size)
 
 
 def combine_courses(
@@ -239,7 +241,8 @@ def combine_courses(
     most = COMBINED.recombined
     combined = _combined(surface, courses, corners, smoothness, any_order, most)
     if combined is not None:
-        yield from _finalists(surface, combined, smoothness, any_order, COMBINED)
+        best = combined.only(distinct_courses(surface, combined, smoothness, COMBINED.apart))
+        yield from _finalists(surface, best, smoothness, any_order, COMBINED)
 
 
 def _combined(
@@ -250,7 +253,7 @@ def _combined(
     any_order: bool,
     most: int,
 ) -> CourseSet | None:
-    """Relaxed new courses of the legs of given ones; None if there are none."""
+    """Relaxed new courses of the legs of given ones; None if all combinations are known."""
     found = recombined(surface, courses.nodes, courses.visit, courses.simple, smoothness, most)
     if found is None:
         return None
@@ -270,9 +273,8 @@ def _finalists(
     any_order: bool,
     size: SearchSize,
 ) -> Iterator[tuple[Nodes, IntArray, bool]]:
-    """Relax the best courses further and yield them; see `find_courses`."""
-    best = distinct_courses(surface, courses, smoothness, size.apart)[: size.finalists]
-    finalists = courses.only(best)
+    """Relax the first of some courses, the best ones, further and yield them (`find_courses`)."""
+    finalists = courses.only(np.arange(len(courses.simple))[: size.finalists])
     times = 2 if finalists.doublings < MOST_DOUBLINGS else 1
     finalists = with_nodes(surface, finalists, times)
     with subrange(0.7, 1.0):

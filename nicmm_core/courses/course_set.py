@@ -30,7 +30,7 @@ class CourseSet:
     nodes : Nodes
         c courses.
     visit : (n,) int array
-        Index of the control point at each node, -1 where there is none.
+        Index of the control point at each node, -1 at all other nodes.
     simple : (c,) bool array
         Which courses did not cross themselves when crossings were last removed.
     doublings : int

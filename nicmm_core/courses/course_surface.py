@@ -21,7 +21,7 @@ from ..path.visiting_order import shortest_order
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request, mapped_request
-from .course_search import COMBINED, Search, combine_courses, find_courses
+from .course_search import COMBINED, FIRST, Search, combine_courses, find_courses
 from .hop_graph import SEARCH_CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
@@ -132,7 +132,7 @@ class CourseSurface:
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return MappedSurface(mesh, replace(own, vertex_normals=normals))
 
-    def courses(self, request: Request, search: Search | None = None) -> Iterator[Course]:
+    def courses(self, request: Request, search: Search = FIRST) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
 
         Where strands are close together, traces between more nodes may avoid a crossing.
@@ -140,15 +140,13 @@ class CourseSurface:
         Parameters
         ----------
         request : Request
-        search : Search, optional
-            The first search for a whole curve if omitted.
+        search : Search
 
         Raises
         ------
         ControlPointError, UnreachableError
             If via points coincide with control points or lie on another component.
         """
-        search = search or Search()
         request = _with_rounded_points(self._mesh, request)
         on_refined = self._refined.in_parts(request.points)
         along = distances_along_edges(self._surface.without_maps, on_refined)

@@ -287,7 +287,7 @@ class _Fit:
     def missing(self, knots: IntArray, curve: FloatArray) -> IntArray:
         """The places between knots where a curve is farthest from the stroke, the worst first.
 
-        There is none if it is near the stroke everywhere, and at most one between any two knots.
+        At most one lies between any two knots. Empty if the curve is near the stroke everywhere.
         Distances count from the curve to the stroke and from the stroke to the curve.
         """
         both, away = self._away(curve)

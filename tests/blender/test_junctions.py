@@ -185,15 +185,22 @@ def test_a_point_moved_away_is_no_junction_any_more(empty_scene, tee):
     assert len(junctions("Second")) == 1
 
 
+CROSSED_BESIDE = pytest.mark.xfail(
+    strict=True,
+    reason="the curve crosses the other one again 1e-4 beside the junction, in the next face",
+)
+
+
 @pytest.mark.slow
-def test_points_are_added_and_inserted_on_curves(empty_scene, first):
+@pytest.mark.parametrize("height", [0.6, pytest.param(0.5, marks=CROSSED_BESIDE)])
+def test_points_are_added_and_inserted_on_curves(empty_scene, first, height):
     panel = bpy.context.scene.nicmm_curves
     panel.closed, panel.avoid_others, panel.clearance = False, True, CLEARANCE
     scenes.activate(first)
-    call("add_point", position=on(first, ring([110.0], [0.6]))[0])
+    call("add_point", position=on(first, ring([110.0], [height]))[0])
     second = bpy.context.active_object
     second.name = "Second"
-    call("add_point", position=on(first, ring([150.0], [0.6]))[0])
+    call("add_point", position=on(first, ring([150.0], [height]))[0])
     call("add_point", position=place_on(empty_scene, "First", 2))
     assert [each[:2] for each in junctions("Second")] == [(2, "First")]
     assert_on(empty_scene, "Second", 2)
