@@ -50,6 +50,9 @@ INDISTINGUISHABLE = 1.0
 RESTING = 0.1
 """Greatest relative decrease of a loss that has reached its plateau."""
 
+NEAR = 0.02
+"""Greatest relative decrease of a loss after an early stop that comes late enough."""
+
 STILLS = "convergence_curves.png"
 PICTURED = 3
 COLOURS = (renders.BLUE, renders.ORANGE, renders.GREEN)
@@ -58,7 +61,7 @@ COLOURS = (renders.BLUE, renders.ORANGE, renders.GREEN)
 def measure(scale: Scale) -> Results:
     """Continue fits beyond the early stop, on several meshes."""
     network = load_network()
-    meshes = collections.surfaces(scale, scale.choose(8, 1))
+    meshes = collections.surfaces(scale, scale.choose(16, 1))
     courses: list[Results] = []
     pictures: list[renders.Picture] = []
     for sample in random_samples(meshes, 1, SEED):
@@ -216,6 +219,10 @@ def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     at_stop = [_fallen(course, course["stop"]) for course in courses]
     least = [np.fmin.accumulate(_losses(course)) for course in courses]
     further = float(np.median([1.0 - one[-1] / one[: PLATEAU + 1][-1] for one in least]))
+    near = sum(
+        one[min(stop, len(one)) - 1] <= (1.0 + NEAR) * one[-1]
+        for stop, one in zip(stops, least, strict=True)
+    )
     longer = float(np.median([course["seconds"][-1] / course["seconds"][0] for course in courses]))
     text = (
         f"Fig. 3: by iteration {PLATEAU}, {100 * np.median(fallen):.0f} % (median) of the "
@@ -232,7 +239,8 @@ def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     text += (
         f"At the early stop, after {np.median(stops):.0f} iterations (median; paper: "
         f"{PAPER_EARLY_STOP} of AdamW), {100 * np.median(at_stop):.0f} % of the decrease has taken "
-        f"place. {_jumps(courses, later[0])}\n\n"
+        f"place, and on {near} of {len(courses)} sets the loss is within {100 * NEAR:g} % of the "
+        f"least one up to iteration {later[-1]}. {_jumps(courses, later[0])}\n\n"
         f"Fig. 4: {later[-1]} iterations take {longer:.1f} times as long as those up to the early "
         f"stop (median). In between, the greatest distance of the curves is "
         f"{np.median(greatest):.2f} % of the diagonal (median) and {max(greatest):.2f} % on the "

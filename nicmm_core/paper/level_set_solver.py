@@ -2,9 +2,11 @@
 
 Each step is looked for among the values of φ at the vertices (`variational`) or among the
 parameters of the network (`fitting`). After a step φ is replaced by the signed distance to the new
-curve, because the ridges of the old distance would hold the curve back. If changing the sign of a
-vertex would split the curve or detach it from a control point, the step is halved; if that does not
-help, it is solved again with this vertex held. So the zero set is always one simple curve.
+curve, because the ridges of the old distance would hold the curve back. This may raise the energy,
+so the curve fluctuates in the end, unless only steps that lower it are taken from then on. If
+changing the sign of a vertex would split the curve or detach it from a control point, the step is
+halved; if that does not help, it is solved again with this vertex held. So the zero set is always
+one simple curve.
 """
 
 from __future__ import annotations
@@ -50,9 +52,13 @@ class SolverConfig:
         Initial weight of the step's norm, relative to λ_sdf.
     least_damping : float
         Lower bound of that weight.
+    settling : int, optional
+        Number of iterations after which the solver returns to the best φ, if the least loss has
+        fallen by less than the tolerance in them. From then on, it takes a step only if the signed
+        distance to the new curve has less energy.
     patience : int
-        Number of iterations after which the solver has converged if the least loss has fallen by
-        less than the tolerance in them.
+        Number of iterations after which the solver has converged, if the least loss has fallen by
+        less than the tolerance in them. They count after it has settled.
     tolerance, relative_tolerance : float
         Decrease of the least loss that counts as progress: absolute, and relative to the loss.
     iterations : int
@@ -70,6 +76,7 @@ class SolverConfig:
     beside: float = 2.0
     damping: float = 1e-2
     least_damping: float = 1e-6
+    settling: int | None = None
     patience: int = 10
     tolerance: float = 1e-5
     relative_tolerance: float = 0.0
@@ -84,6 +91,9 @@ LEAST_GAIN = 1e-3
 
 GOOD_GAIN, POOR_GAIN = 0.75, 0.25
 """Relative decreases above which the damping is lowered, and below which it is raised."""
+
+MORE_DAMPING = 4.0
+"""Factor of the damping after a step that is not accepted; its inverse after one of good gain."""
 
 
 class Steps(Protocol):
@@ -118,6 +128,14 @@ class Steps(Protocol):
         """Make the last step taken permanent."""
 
 
+class _LevelSet(NamedTuple):
+    """A signed distance φ, (n,), with its band and its energy."""
+
+    field: FloatArray
+    band: NarrowBand
+    energy: float
+
+
 def minimise(
     problem: Problem,
     start: FloatArray,
@@ -149,34 +167,50 @@ def minimise(
     surface = build_distance_surface(problem.vertices, problem.working.faces, h)
     links = VertexLinks(problem.working, problem.bundle)
     reach = (config.half_width + 1.0) * h
-    field = redistanced(surface, start, controls, reach, problem.bundle)
-    best_field, losses, least = field, [], []
-    damping, n_held = config.damping, 0
+
+    def level_set(field: FloatArray) -> _LevelSet:
+        distance = redistanced(surface, field, controls, reach, problem.bundle)
+        band = build_narrow_band(problem, distance, config.half_width * h)
+        return _LevelSet(distance, band, evaluate(band, weights, distance[band.unknowns]).energy)
+
+    present = best = level_set(start)
+    losses: list[float] = []
+    least: list[float] = []
+    damping, n_held, is_settled = config.damping, 0, False
     status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
-        band = build_narrow_band(problem, field, config.half_width * h)
-        losses.append(evaluate(band, weights, field[band.unknowns]).energy)
-        if not np.isfinite(losses[-1]):
+        losses.append(present.energy)
+        if not np.isfinite(present.energy):
             status = Status.DIVERGED
             break
-        if losses[-1] <= min(losses):
-            best_field = field
-        least.append(min(losses))
-        if watch is not None and not watch(iteration / config.iterations, best_field):
+        if present.energy <= best.energy:
+            best = present
+        least.append(best.energy)
+        if watch is not None and not watch(iteration / config.iterations, best.field):
             status = Status.CANCELLED
             break
-        if _has_converged(least, config):
+        if _has_stalled(least, config.patience, config):
             status = Status.CONVERGED
             break
+        if config.settling is not None and not is_settled:
+            is_settled = _has_stalled(least, config.settling, config)
+            if is_settled:
+                present, least = best, [best.energy]
+                damping = max(damping, config.damping)
         if iteration == config.iterations:
             break
-        step = _step(problem, band, links, field, steps, weights, damping, config)
+        step = _step(problem, present.band, links, present.field, steps, weights, damping, config)
         if step is None:
             status = Status.CONVERGED
             break
-        damping, n_held = step.damping, n_held + step.held
-        field = redistanced(surface, step.field, controls, reach, problem.bundle)
-    field = signed_distance_of(problem, best_field)
+        found, gain = level_set(step.field), step.gain
+        if is_settled:
+            gain = (present.energy - found.energy) / step.predicted
+        damping = _next_damping(step.damping, gain, config)
+        if not is_settled or gain > LEAST_GAIN:
+            steps.keep()
+            present, n_held = found, n_held + step.held
+    field = signed_distance_of(problem, best.field)
     return Solution(field, energy_of(problem, field), losses, status, n_held)
 
 
@@ -186,11 +220,11 @@ def signed_distance_of(problem: Problem, field: FloatArray) -> FloatArray:
     return redistanced(surface, field, problem.loop.control_vertices, bundle=problem.bundle)
 
 
-def _has_converged(least: list[float], config: SolverConfig) -> bool:
-    """Whether the least loss so far, in every iteration, has converged."""
-    if len(least) <= config.patience:
+def _has_stalled(least: list[float], patience: int, config: SolverConfig) -> bool:
+    """Whether the least loss so far, in every iteration, has hardly fallen in the last ones."""
+    if len(least) <= patience:
         return False
-    decrease = least[-1 - config.patience] - least[-1]
+    decrease = least[-1 - patience] - least[-1]
     return decrease < max(config.tolerance, config.relative_tolerance * least[-1])
 
 
@@ -202,14 +236,27 @@ class _Step(NamedTuple):
     field : (n,) float array
         φ after the step.
     damping : float
-        Damping for the next step.
+        Damping with which it was found.
+    predicted, gain : float
+        Decrease of the energy to second order, and the decrease relative to it.
     held : int
         Number of vertices that had to keep their signs.
     """
 
     field: FloatArray
     damping: float
+    predicted: float
+    gain: float
     held: int
+
+
+def _next_damping(damping: float, gain: float, config: SolverConfig) -> float:
+    """Damping for the step after one with some gain."""
+    if not gain > LEAST_GAIN:  # also if it is NaN
+        return MORE_DAMPING * damping
+    if gain > GOOD_GAIN:
+        return max(damping / MORE_DAMPING, config.least_damping)
+    return 2.0 * damping if gain < POOR_GAIN else damping
 
 
 def _step(
@@ -253,13 +300,8 @@ def _step(
         moved[breaking] = LEAST_DISTANCE * h * signs_with_zeros(field, controls)[breaking]
         energy = evaluate(band, weights, moved[band.unknowns]).energy
         gain = (residuals.energy - energy) / predicted
-        if not gain > LEAST_GAIN:  # also if it is NaN
-            damping *= 4.0
-            continue
-        steps.keep()
-        if gain > GOOD_GAIN:
-            damping = max(damping / 4.0, config.least_damping)
-        elif gain < POOR_GAIN:
-            damping *= 2.0
-        return _Step(moved, damping, len(np.union1d(band.unknowns[held], breaking)))
+        if gain > LEAST_GAIN:
+            n_held = len(np.union1d(band.unknowns[held], breaking))
+            return _Step(moved, damping, predicted, gain, n_held)
+        damping = _next_damping(damping, gain, config)
     return None

@@ -107,7 +107,7 @@ def test_vertex_that_would_break_the_curve_is_held(problem):
 def test_vertex_that_is_held_no_more_keeps_its_sign(problem, monkeypatch):
     """Even if the step is accepted: here any step is."""
     monkeypatch.setattr(level_set_solver, "LEAST_GAIN", -np.inf)
-    monkeypatch.setattr(level_set_solver, "_has_converged", lambda least, config: False)
+    monkeypatch.setattr(level_set_solver, "_has_stalled", lambda *_: False)
     fields = []
     steps = BreakingSteps(problem)
     config = SolverConfig(iterations=2, holds=0)
@@ -197,6 +197,21 @@ def test_stops_when_the_loss_has_not_fallen_for_the_patience(problem):
             config = SolverConfig(patience=patience, **{"tolerance": -1.0, **loose})
             result = run(problem, config=config)
             assert (result.status, result.iterations) == (Status.CONVERGED, patience + 1)
+
+
+@pytest.mark.slow
+def test_settles_at_the_least_loss_and_never_rises_again(problem):
+    """The steps lower the energy as they should, but the signed distance may raise it."""
+    config = SolverConfig(iterations=30, patience=30, tolerance=-1.0)
+    free = run(problem, config=config).losses
+    assert np.diff(free).max() > 0.0
+    for settling in (1, 3):
+        settled = SolverConfig(**{**vars(config), "settling": settling, "tolerance": 1e9})
+        losses = run(problem, config=settled).losses
+        assert losses[: settling + 1] == free[: settling + 1]
+        after = [min(losses[: settling + 1]), *losses[settling + 1 :]]
+        assert np.diff(after).max() <= 0.0
+        assert after[-1] < after[0]
 
 
 def test_the_field_is_that_of_the_least_loss(problem):
