@@ -15,7 +15,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import improvement
-from nicmm_core.courses import course_candidates, course_search, uncrossing
+from nicmm_core.courses import course_search, uncrossing
 from nicmm_core.courses.course_search import COMBINED
 from nicmm_core.courses.recombination import recombined
 from nicmm_core.geometry.array_types import IntArray
@@ -189,9 +189,6 @@ LEFT_OUT: Mapping[str, Callable[[], Any]] = {
     ),
     "combinations across searches": partial(mock.patch.object, improvement, "COMBINED_COURSES", 0),
     "removal of crossings": partial(mock.patch.object, uncrossing, "ROUNDS", 0),
-    "other orders of the points": partial(
-        mock.patch.object, course_candidates, "cheapest_orders", lambda *given: []
-    ),
     "repeated searches": partial(mock.patch.object, improvement, "FURTHER_SEEDS", ()),
     "searches for parts": partial(mock.patch.object, improvement, "SEARCHES_FOR_PARTS", 0),
 }

@@ -63,7 +63,7 @@ def design_curve(
     order : {"given", "shortest"}
         Whether the curve visits the points in the given order or in the order of the shortest path
         through them, which is cyclic for a closed curve. With "shortest", the curve may visit them
-        in yet another order, if it is fairer then or would cross itself otherwise.
+        in yet another order, if it would cross itself otherwise or, if it is open, is fairer then.
     via_points : mapping, optional
         Points that select one of several courses between two control points, such as
         ``{1: [57]}``. The key is the index of a control point. The value has points, in any form

@@ -34,7 +34,8 @@ def candidates(
     closed: bool,
     smoothness: float,
     any_order: bool,
-    numbers: tuple[int, ...],
+    most: int,
+    most_orders: int,
 ) -> tuple[Nodes, IntArray] | None:
     """Find the cheapest courses in the cheapest orders of the control points.
 
@@ -48,9 +49,11 @@ def candidates(
     smoothness : float
         Divisor of the tension.
     any_order : bool
-        Whether a course may visit the control points in another order because it is cheaper.
-    numbers : tuple of int
-        Numbers of candidates by the rank of their order of the control points.
+        Whether an open course may visit the control points in another order because it is cheaper.
+    most : int
+        Greatest number of candidates.
+    most_orders : int
+        Greatest number of orders of the control points among which they are divided.
 
     Returns
     -------
@@ -61,16 +64,16 @@ def candidates(
     count = len(courses.points)
     order = np.arange(count)
     n_legs = count if closed else count - 1
-    if any_order and count <= MOST_POINTS:
+    if any_order and not closed and count <= MOST_POINTS:
         pairs = combinations(range(count), 2)
         choices = leg_choices(courses, pairs, n_legs)
-        orders = [*cheapest_orders(courses, choices, closed), order]
+        orders = [*cheapest_orders(courses, choices), order]
     else:
         legs = legs_of_order(order, closed).tolist()
         choices = leg_choices(courses, ((start, end) for start, end in legs), n_legs)
         orders = [order]
     checkpoint()
-    possible, routes = _routes_of_orders(courses, choices, orders, closed, len(numbers))
+    possible, routes = _routes_of_orders(courses, choices, orders, closed, most_orders)
     if not routes:
         return None
     with subrange(0.2, 0.3):
@@ -79,7 +82,8 @@ def candidates(
         )
     crosses = crossing_legs(curves)
     # The first order takes over the candidates of orders that there are not.
-    shares = [sum(numbers) - sum(numbers[1 : len(routes)]), *numbers[1 : len(routes)]]
+    share = most // most_orders
+    shares = [most - share * (len(routes) - 1), *[share] * (len(routes) - 1)]
     choice, visit = [], []
     for number, (of_order, order, share) in enumerate(zip(routes, possible, shares, strict=True)):
         own = slice(

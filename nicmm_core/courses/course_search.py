@@ -48,8 +48,11 @@ class SearchSize:
 
     Attributes
     ----------
-    candidates : tuple of int
-        Candidates by the rank of their order of the control points.
+    candidates : int
+        Candidates from the hop graph.
+    orders : int
+        Greatest number of orders of the control points of an open curve among which candidates are
+        divided.
     recombined : int
         Courses combined from the legs of relaxed candidates.
     finalists : int
@@ -59,19 +62,20 @@ class SearchSize:
         Distance, in bounding-box diagonals, up to which two of them count as the same.
     """
 
-    candidates: tuple[int, ...]
+    candidates: int
+    orders: int
     recombined: int
     finalists: int
     apart: float
 
 
-WHOLE = SearchSize((20, 16, 16, 16, 16, 16), 16, 10, SAME_COURSE)
+WHOLE = SearchSize(64, 6, 16, 10, SAME_COURSE)
 """Size of a search for a whole curve."""
 
-PART = SearchSize((16,), 6, 4, PARTS_APART)
+PART = SearchSize(16, 1, 6, 4, PARTS_APART)
 """Size of a search for a part of a curve, which has few legs in a given order."""
 
-COMBINED = SearchSize((), 32, 10, PARTS_APART)
+COMBINED = SearchSize(0, 1, 32, 10, PARTS_APART)
 """Size of a search without candidates of its own, which combines the courses of earlier ones."""
 
 COMBINED_OF_A_SEARCH = 20
@@ -175,8 +179,8 @@ def find_courses(
     smoothness : float
         Divisor of the tension.
     any_order : bool
-        Whether a course may visit the control points in another order, to avoid crossing itself or
-        because it is cheaper.
+        Whether a course may visit the control points in another order, to avoid crossing itself or,
+        if it is open, because it is cheaper.
     search : Search
     """
     legs = legs_of_order(np.arange(len(points)), closed)
@@ -193,7 +197,9 @@ def find_courses(
         graph, points, corners, length, factor, tension, surface.normal_bending
     )
     checkpoint()
-    found = candidates(in_graph, surface, closed, smoothness, any_order, search.size.candidates)
+    found = candidates(
+        in_graph, surface, closed, smoothness, any_order, search.size.candidates, search.size.orders
+    )
     if found is None:
         return
     nodes, point = found

@@ -1,8 +1,9 @@
-"""Finds orders of the control points in which a curve may bend least, by the costs of legs.
+"""Finds orders of the control points in which an open curve may bend least, by the costs of legs.
 
-The fairest curve often visits its points in another order than the shortest one. With few points
-all orders are compared; with more, those that reverse a section of the shortest one ("2-opt":
-Croes, "A method for solving traveling-salesman problems", 1958).
+The fairest open curve often visits its points in another order than the shortest one. With few
+points all orders are compared; with more, those that reverse a section of the shortest one
+("2-opt": Croes, "A method for solving traveling-salesman problems", 1958). Closed curves do not
+gain from other orders than those to which uncrossing leads.
 """
 
 from __future__ import annotations
@@ -31,23 +32,21 @@ MAX_COST_OF_ORDER = 2.0
 """Cost of an order, relative to the cheapest, above which it is left out."""
 
 
-def possible_orders(count: int, closed: bool) -> list[IntArray]:
+def possible_orders(count: int) -> list[IntArray]:
     """Orders of points 0 … count - 1 that are tried, each once, 0 … count - 1 the first.
 
-    A closed order starts at 0. An order is the same in the opposite direction. All orders are tried
-    if they are at most `MOST_ORDERS`, else those that reverse a section of 0 … count - 1.
+    An order is the same in the opposite direction. All orders are tried if they are at most
+    `MOST_ORDERS`, else those that reverse a section of 0 … count - 1.
     """
     base = np.arange(count)
-    if math.factorial(count - closed) <= 2 * MOST_ORDERS:
-        ahead = base[: int(closed)]
-        rest = itertools.permutations(range(int(closed), count))
+    if math.factorial(count) <= 2 * MOST_ORDERS:
         # Of both directions, the first in lexicographic order.
-        orders = [np.array([*ahead, *each]) for each in rest if each[0] <= each[-1]]
-        return orders if count > 1 else [base]
+        orders = itertools.permutations(range(count))
+        return [np.array(each) for each in orders if each[0] <= each[-1]]
     reversed_sections = [
         np.concatenate([base[:first], base[first : last + 1][::-1], base[last + 1 :]])
-        for first, last in itertools.combinations(range(int(closed), count), 2)
-        if last - first < count - 1 - closed  # not the whole order
+        for first, last in itertools.combinations(range(count), 2)
+        if last - first < count - 1  # not the whole order
     ]
     return [base, *reversed_sections]
 
@@ -61,9 +60,8 @@ def legs_of_order(order: IntArray, closed: bool) -> IntArray:
 def cheapest_orders(
     graph: CourseGraph,
     choices: Mapping[tuple[int, int], LegChoices],
-    closed: bool,
 ) -> list[IntArray]:
-    """Find cheap orders of all control points of a graph, by ascending cost.
+    """Find cheap orders of all control points of an open curve, by ascending cost.
 
     The cost of an order is that of its cheapest legs whose directions fit each other. Crossings do
     not count.
@@ -74,17 +72,16 @@ def cheapest_orders(
         Its k control points are in an order that makes a short tour.
     choices : mapping
         Choices for the legs between all pairs of points.
-    closed : bool
     """
     orders, costs = [], []
-    for order in possible_orders(len(graph.points), closed):
+    for order in possible_orders(len(graph.points)):
         legs = [
             _first_choices(choices[start, end].by_direction)
-            for start, end in legs_of_order(order, closed).tolist()
+            for start, end in legs_of_order(order, closed=False).tolist()
         ]
         if all(len(leg.state) for leg in legs):
             orders.append(order)
-            costs.append(float(least_totals(graph, legs, closed)[0].min()))
+            costs.append(float(least_totals(graph, legs, closed=False)[0].min()))
     cost = without_rounding_errors(np.array(costs))
     ascending = np.argsort(cost, kind="stable")
     cheap = ascending[cost[ascending] <= MAX_COST_OF_ORDER * cost.min(initial=np.inf)]
