@@ -26,11 +26,11 @@ from .mesh import Mesh, area_vectors
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
-RESOLUTIONS = (1e-5, 3e-6, 1e-6, 1e-7, 1e-9)
+RESOLUTIONS = (1e-6, 1e-7, 1e-9)
 """Units to which coordinates are rounded, in square roots of the area.
 
-The coarser they are, the fewer coordinates of a mesh far away, or with gaps, are rounded to another
-value. Finer ones are for meshes with tiny or thin faces.
+The coarser they are, the fewer coordinates of a mesh far away are rounded to another value. Finer
+ones are for meshes with needles.
 """
 
 SOUND = 0.05
