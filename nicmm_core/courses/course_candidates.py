@@ -82,8 +82,8 @@ def candidates(
         )
     crosses = crossing_legs(curves)
     # The first order takes over the candidates of orders that there are not.
-    share = most // most_orders
-    shares = [most - share * (len(routes) - 1), *[share] * (len(routes) - 1)]
+    of_others = [most // most_orders] * (len(routes) - 1)
+    shares = [most - sum(of_others), *of_others]
     choice, visit = [], []
     for number, (of_order, order, share) in enumerate(zip(routes, possible, shares, strict=True)):
         own = slice(
