@@ -255,7 +255,7 @@ class Designer:
             request = Request(points=snapped(images[curve.control_index]), **unpainted)
             manifold, there = next(self._manifolds(request))
             found = mirrored_design(
-                manifold.designer.surface,
+                manifold.unrounded,
                 there,
                 manifold.from_original(positions),
                 curve,

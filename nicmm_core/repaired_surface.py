@@ -16,7 +16,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -31,6 +31,7 @@ from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, lies_on,
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, coincide, joined
+from .mapped_surface import MappedSurface
 from .path.via_points import with_via_points
 from .relaxation.curve_along import curve_along
 from .repair.clean_surface import CleanSurface
@@ -38,7 +39,9 @@ from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
+from .status import Status
 from .surface_designer import SurfaceDesigner
+from .symmetry.halves import exactly_symmetric
 from .symmetry.reflection import asymmetry
 
 LARGEST_COPY = 200_000
@@ -80,6 +83,14 @@ class Manifold:
     def mesh(self) -> Mesh:
         """The mesh of the designer."""
         return self.designer.mesh
+
+    @cached_property
+    def unrounded(self) -> MappedSurface:
+        """The surface of the designer's mesh with coordinates that are not rounded."""
+        last = self.copies[-1] if self.copies else None
+        if not isinstance(last, Renumbered):
+            return self.designer.surface
+        return MappedSurface(last.unrounded)
 
     def from_original(self, positions: FloatArray) -> FloatArray:
         """Map positions in the space of the given mesh, (n, 3), to that of the designer's mesh."""
@@ -166,6 +177,8 @@ class Manifold:
             If the curve is not simple on the given mesh, since it crosses removed faces.
         """
         curves, resumable = design.curves, design.resumable
+        if resumable is not None and design.status is not Status.CANCELLED:
+            curves = [self._with_exact_images(curves[0], resumable)]
         for copy in self.copies[::-1]:
             curves = [copy.curve_back(curve) for curve in curves]
         if self.repaired.differs:
@@ -184,6 +197,13 @@ class Manifold:
             resumable=resumable and replace(resumable, given=self.repaired.original),
             repairs=dict(self.repaired.repairs),
         )
+
+    def _with_exact_images(self, curve: SurfaceCurve, design: Resumable) -> SurfaceCurve:
+        """A curve of the designer, with mirror images that rounding has not moved."""
+        if design.request.mirror is None:
+            return curve
+        surface = self.unrounded.without_maps
+        return exactly_symmetric(surface, curve, design.curve, design.visited, design.request)
 
     def _across_removed_faces(self, curve: SurfaceCurve, request: Request) -> SurfaceCurve:
         """A curve mapped back to the given mesh, led across the faces that were removed from it."""

@@ -26,11 +26,11 @@ from .mesh import Mesh, area_vectors
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
-RESOLUTIONS = (1e-6, 1e-7, 1e-9)
+RESOLUTIONS = (1e-5, 3e-6, 1e-6, 1e-7, 1e-9)
 """Units to which coordinates are rounded, in square roots of the area.
 
-The coarser they are, the fewer coordinates of a mesh far away are rounded to another value. Finer
-ones are for meshes with needles.
+The coarser they are, the fewer coordinates of a mesh far away, or with gaps, are rounded to another
+value. Finer ones are for meshes with tiny or thin faces.
 """
 
 SOUND = 0.05
@@ -134,6 +134,12 @@ class Renumbered:
         barycentric = np.empty_like(points.barycentric)
         np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
         return SurfacePoints(self.face[points.faces], barycentric)
+
+    @cached_property
+    def unrounded(self) -> Mesh:
+        """The copy with coordinates that are not rounded, on which mirror images are exact."""
+        places = self.frame.coordinates(self.original.vertices[self.vertex])
+        return Mesh(places, self.mesh.faces)
 
     def weights_to(self, weights: FloatArray) -> FloatArray:
         """Map weights at the vertices of the original, (V,), to the vertices of the copy, (V',)."""

@@ -14,19 +14,23 @@ import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
-from ..geometry.curve import SurfaceCurve
+from ..geometry.curve import SurfaceCurve, points_of, with_points
 from ..geometry.mirror import ON_PLANE, Mirror
 from ..geometry.surface_points import SurfacePoints, joined
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.discrete_curve import DiscreteCurve, short_segments, without_points
 from ..request import Request
-from .reflection import joined_places, reflected_places, with_controls
+from .reflection import asymmetry, joined_places, reflected_places, with_controls
 
 TRIMMED = 1.0 / 1024.0
 """Length of curve next to the plane that is replaced by a trace, relative to the whole length.
 
 It is half the usual distance between nodes.
 """
+
+SYMMETRIC, SYMMETRIC_UP_TO_ROUNDING = 1e-9, 1e-4
+"""Asymmetry of a curve, in bounding-box diagonals, up to which it counts as symmetric, and up to
+which the rounding of the coordinates of the canonical copy explains it."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,39 @@ def symmetric_curves(
         found = None if half is None else with_image(surface, half, request)
         if found is not None:
             yield found
+
+
+def exactly_symmetric(
+    surface: CurveSurface,
+    curve: SurfaceCurve,
+    nodes: DiscreteCurve,
+    visited: IntArray,
+    request: Request,
+) -> SurfaceCurve:
+    """A symmetric curve with the images of its points on the surface before rounding.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+        The canonical copy with coordinates that are not rounded.
+    curve : SurfaceCurve
+        A curve on the canonical copy.
+    nodes, visited, request : DiscreteCurve, (n,) int array, Request
+        The same curve as for `symmetric_curves`.
+
+    Returns
+    -------
+    SurfaceCurve
+        The curve itself if it is already symmetric, if it is not nearly symmetric, or if its image
+        cannot be traced.
+    """
+    plane, mesh = mirror_of(request).plane, surface.mesh
+    before = asymmetry(with_points(mesh, curve, points_of(curve)), plane)
+    if not SYMMETRIC < before / mesh.diagonal <= SYMMETRIC_UP_TO_ROUNDING:
+        return curve
+    exact = [each for _, each, _ in symmetric_curves(surface, nodes, visited, request)]
+    best = min(exact, key=lambda each: asymmetry(each, plane), default=None)
+    return curve if best is None or asymmetry(best, plane) >= before else best
 
 
 def half_of(

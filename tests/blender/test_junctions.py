@@ -185,14 +185,8 @@ def test_a_point_moved_away_is_no_junction_any_more(empty_scene, tee):
     assert len(junctions("Second")) == 1
 
 
-CROSSED_BESIDE = pytest.mark.xfail(
-    strict=True,
-    reason="the curve crosses the other one again 1e-4 beside the junction, in the next face",
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("height", [0.6, pytest.param(0.5, marks=CROSSED_BESIDE)])
+@pytest.mark.parametrize("height", [0.6, 0.5])
 def test_points_are_added_and_inserted_on_curves(empty_scene, first, height):
     panel = bpy.context.scene.nicmm_curves
     panel.closed, panel.avoid_others, panel.clearance = False, True, CLEARANCE

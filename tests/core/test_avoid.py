@@ -10,7 +10,10 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import improvement, shapes
+from nicmm_core.avoidance.avoided_curve import avoided_curves
+from nicmm_core.avoidance.off_curves import surface_off_curves
 from nicmm_core.commands import main
+from nicmm_core.geometry.curve import points_of
 from nicmm_core.geometry.distances import distance_to_segments
 from nicmm_core.geometry.surface_points import nearest_points
 from nicmm_core.io.files import read_curve, write_curve, write_mesh
@@ -101,6 +104,20 @@ def test_without_clearance_it_only_does_not_cross(plate, line):
 
 
 @pytest.mark.slow
+def test_the_barrier_covers_the_whole_curve(ball):
+    """Also where the curve runs close to edges, so that the strip beside it is very narrow."""
+    around = np.array([[1.0, 0.1, 0.0], [-0.6, 0.8, 0.2], [-0.4, -0.9, 0.1]])
+    curve = nicmm.design_curve(ball, nearest_vertices(ball, around)).curves[0]
+    manifold = next(nicmm.Designer(ball)._whole.manifolds())
+    avoided = avoided_curves(ball, [curve], points_of(curve)[:0])
+    off = surface_off_curves(manifold, avoided, 0.0).mesh
+    areas = np.bincount(off.face_component, weights=off.face_areas)
+    sides = np.isin(off.face_component, np.argsort(areas)[-2:])
+    assert off.face_areas[sides].sum() > 0.98 * ball.face_areas.sum()
+    _, away = nearest_points(off, sampled(curve), np.flatnonzero(sides))
+    assert away.min() > 1e-8
+
+
 def test_it_goes_round_the_end(plate, line):
     points = flat((0.45, 0.1), (0.45, -0.1))
     design = nicmm.design_curve(plate, points, closed=False, avoid=[line], clearance=CLEARANCE)

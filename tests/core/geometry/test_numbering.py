@@ -68,7 +68,7 @@ def test_points_values_and_curves_are_mapped(surface):
     def in_frame(positions):
         return (positions - frame.centre) @ frame.axes / there.frame.unit
 
-    assert there.mesh.face_areas.sum() == pytest.approx(1.0, abs=1e-6)
+    assert there.mesh.face_areas.sum() == pytest.approx(1.0, abs=RESOLUTIONS[0])
     points = random_surface_points(surface, 7, 0)
     mapped = there.points_to(points).positions(there.mesh)
     np.testing.assert_allclose(mapped, in_frame(points.positions(surface)), atol=RESOLUTIONS[0])
@@ -82,7 +82,7 @@ def test_points_values_and_curves_are_mapped(surface):
         lengths[there.vertex], there.frame.unit * there.mesh.vertices[:, 0]
     )
     normals = surface.face_normals[there.face] @ frame.axes
-    np.testing.assert_allclose(there.mesh.face_normals, normals, atol=1e-4)
+    np.testing.assert_allclose(there.mesh.face_normals, normals, atol=1e-3)
     chosen = np.flatnonzero(there.mesh.referenced)[[3, 40, 80]]
     curve = nicmm.design_curve(there.mesh, chosen, order="shortest").curves[0]
     on_original = there.curve_back(curve)
@@ -93,7 +93,7 @@ def test_points_values_and_curves_are_mapped(surface):
 
 
 @pytest.mark.parametrize(
-    "width, resolution", [(1.0, 1e-6), (1e-5, 1e-7), (1e-7, 1e-9), (1e-9, None)]
+    "width, resolution", [(1.0, 1e-5), (1e-5, 1e-7), (1e-7, 1e-9), (1e-9, None)]
 )
 def test_coordinates_are_rounded_as_coarsely_as_needles_allow(width, resolution):
     vertices = np.array(

@@ -35,7 +35,7 @@ def test_mirror_image_is_a_valid_design(creature, closed):
     assert image.energy["smooth"] == pytest.approx(design.energy["smooth"], rel=0.01)
     if closed:
         away = apart(FLIP * image.curves[0].points, design.curves[0].points)
-        assert away < 1e-5 * creature.diagonal
+        assert away < 1e-12 * creature.diagonal
 
 
 @pytest.mark.slow
