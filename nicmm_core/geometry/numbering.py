@@ -258,19 +258,27 @@ def rounded_to_integers(coordinates: FloatArray) -> IntArray:
 def principal_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> PrincipalFrame:
-    """Compute the principal frame of a surface from the centroids and areas of its faces."""
-    first, second, third = (np.take(vertices, corner, axis=0) for corner in faces.T)
-    offset = (first + second + third) / 3.0
+    """Compute the principal frame of a surface from the first three moments of its area."""
     area = face_areas.sum()
     share = face_areas / area
-    centre = share @ offset
-    offset -= centre
-    squares, eigenvectors = np.linalg.eigh(offset.T @ (share[:, None] * offset))
+    at_vertices = np.bincount(faces.ravel(), np.repeat(share / 3.0, 3), len(vertices))
+    centre = at_vertices @ vertices
+    offset = vertices - centre
+    total = sum(np.take(offset, corner, axis=0) for corner in faces.T)
+    # The mean of x xᵀ over a face with the corners a, b, c is (aaᵀ + bbᵀ + ccᵀ + ttᵀ) / 12, where
+    # t = a + b + c.
+    moments = 0.25 * (offset.T @ (at_vertices[:, None] * offset))
+    moments += total.T @ (share[:, None] * total) / 12.0
+    squares, eigenvectors = np.linalg.eigh(moments)
     axes = _settled(squares, eigenvectors)
     deviation = float(np.sqrt(squares.sum()))
-    along = offset @ axes / max(deviation, TINY)
-    skewness = share @ (along * along * along)
-    largest = axes[np.abs(axes).argmax(axis=0), np.arange(3)]
+    along, total = offset @ axes / max(deviation, TINY), total @ axes / max(deviation, TINY)
+    # Likewise, the mean of x³ is (t³ + 3 t (a² + b² + c²) + 2 (a³ + b³ + c³)) / 60.
+    squared = along * along
+    at_corners = sum(np.take(squared, corner, axis=0) for corner in faces.T)
+    skewness = share @ (total * (total * total + 3.0 * at_corners)) / 60.0
+    skewness += 0.1 * (at_vertices @ (squared * along))
+    largest = axes[np.abs(axes).round(6).argmax(axis=0), np.arange(3)]
     signs = np.where(np.abs(skewness) > SYMMETRIC, skewness, largest)
     axes *= np.where(signs < 0.0, -1.0, 1.0)
     return PrincipalFrame(centre, axes, max(float(np.sqrt(area)), TINY))

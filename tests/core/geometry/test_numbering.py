@@ -1,5 +1,6 @@
 """Tests that numbering, pose and size of a mesh affect neither the new numbering nor the curve."""
 
+import igl
 import numpy as np
 import pytest
 
@@ -30,6 +31,10 @@ def rotation(seed):
     return turned * np.sign(np.linalg.det(turned))
 
 
+def frame_of(mesh):
+    return principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_shuffled_meshes_become_the_same(body, seed):
     one, other = renumbered(body), renumbered(shuffled(body, seed)[0])
@@ -51,19 +56,36 @@ def test_rigid_motions_and_scales_keep_the_numbers(body, seed):
     np.testing.assert_array_equal(one.vertex, other.vertex)
     np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
     assert one.frame.unit == pytest.approx(3.7 * other.frame.unit)
-    at, there = (
-        principal_frame(mesh.vertices, mesh.faces, mesh.face_areas).rounded_coordinates(
-            mesh.vertices
-        )
-        for mesh in (body, moved)
-    )
+    at, there = (frame_of(mesh).rounded_coordinates(mesh.vertices) for mesh in (body, moved))
     np.testing.assert_array_equal(there, at)
+
+
+def test_frames_depend_on_the_surface_only():
+    """Finer triangles of the same surface have the same frame."""
+    corners = np.random.default_rng(5).normal(size=(4, 3))
+    coarse = nicmm.Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    fine = nicmm.Mesh(*igl.upsample(coarse.vertices, coarse.faces, 4))
+    one, other = (
+        principal_frame(each.vertices, each.faces, each.face_areas) for each in (coarse, fine)
+    )
+    np.testing.assert_allclose(one.centre, other.centre, atol=1e-12)
+    np.testing.assert_allclose(one.axes, other.axes, atol=1e-9)
+    weights = coarse.face_areas / coarse.face_areas.sum()
+    np.testing.assert_allclose(one.centre, weights @ corners[coarse.faces].mean(axis=1), atol=1e-12)
+
+
+def test_a_symmetric_body_has_one_frame_at_any_size():
+    """The axes of a cube are those of space, whatever the diagonals of its squares."""
+    cube = shapes.cube()
+    for factor in (1.0, 1e6, 1e-6):
+        frame = frame_of(nicmm.Mesh(factor * cube.vertices, cube.faces))
+        np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-9)
 
 
 @pytest.mark.slow
 def test_points_values_and_curves_are_mapped(surface):
     there = renumbered(surface)
-    frame = principal_frame(surface.vertices, surface.faces, surface.face_areas)
+    frame = frame_of(surface)
 
     def in_frame(positions):
         return (positions - frame.centre) @ frame.axes / there.frame.unit
@@ -113,7 +135,7 @@ def test_coordinates_are_rounded_as_coarsely_as_needles_allow(width, resolution)
 
 
 def test_coordinates_stay_exact_if_vertices_must_stay_apart(body):
-    frame = principal_frame(body.vertices, body.faces, body.face_areas)
+    frame = frame_of(body)
     there = renumbered(body, exact=True)
     expected = (body.vertices - frame.centre) @ frame.axes / there.frame.unit
     np.testing.assert_array_equal(there.mesh.vertices, expected[there.vertex])
