@@ -37,8 +37,8 @@ from .start_search import (
     is_new,
 )
 
-SLIGHTLY_BENT = 10.0
-"""L ∮ κ_g² ds above which the search is repeated, a quarter of the value of a circle.
+SLIGHTLY_BENT = 3.0
+"""L ∮ κ_g² ds above which the search is repeated; a circle has 4π², about 40.
 
 Curves above it may wind around limbs, where a search misses more courses.
 """
@@ -48,7 +48,7 @@ BENT = 15.0
 searched for again."""
 
 STRONGLY_BENT = 20.0
-"""L ∮ κ_g² ds above which further courses of a search follow; a circle has 4π², about 40."""
+"""L ∮ κ_g² ds above which further courses of a search follow, half the value of a circle."""
 
 WITH_NORMAL_BENDING = 14.0
 """Increase of these three bounds, relative to them, for each unit of `normal_bending`.
@@ -68,7 +68,7 @@ With normal bending, a loop beside a limb may be found first, and a ring around 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 6
+FURTHER_SEARCHES = 3
 """Greatest number of repeated searches for the whole curve."""
 
 COURSES_OF_A_SEARCH = 3
@@ -80,8 +80,12 @@ The order of their energies with few nodes is unreliable.
 COMBINED_COURSES = 3
 """Greatest number of courses relaxed that combine legs of all searches."""
 
-SEARCHES_FOR_PARTS = 4
-"""Greatest number of searches for parts of the best curve."""
+SEARCHES_FOR_PARTS = 16
+"""Greatest number of searches for parts of the best curve.
+
+Each takes a sixth of the time of a search for the whole curve, and where curves bend far more than
+a circle, it gains more.
+"""
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
 """Greatest numbers of courses looked at after each of them, and of those relaxed."""
