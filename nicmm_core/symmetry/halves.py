@@ -16,6 +16,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, points_of, with_points
 from ..geometry.mirror import ON_PLANE, Mirror
+from ..geometry.numbering import RESOLUTIONS
 from ..geometry.surface_points import SurfacePoints, joined
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 from ..relaxation.discrete_curve import DiscreteCurve, short_segments, without_points
@@ -28,9 +29,11 @@ TRIMMED = 1.0 / 1024.0
 It is half the usual distance between nodes.
 """
 
-SYMMETRIC, SYMMETRIC_UP_TO_ROUNDING = 1e-9, 1e-4
-"""Asymmetry of a curve, in bounding-box diagonals, up to which it counts as symmetric, and up to
-which the rounding of the coordinates of the canonical copy explains it."""
+EXACT = 1e-9
+"""Asymmetry of a curve, in bounding-box diagonals, that rounding errors explain."""
+
+ROUNDED = 10.0 * RESOLUTIONS[0]
+"""Asymmetry that the rounded coordinates of the canonical copy explain, in the same unit."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def exactly_symmetric(
     """
     plane, mesh = mirror_of(request).plane, surface.mesh
     before = asymmetry(with_points(mesh, curve, points_of(curve)), plane)
-    if not SYMMETRIC < before / mesh.diagonal <= SYMMETRIC_UP_TO_ROUNDING:
+    if not EXACT < before / mesh.diagonal <= ROUNDED:
         return curve
     exact = [each for _, each, _ in symmetric_curves(surface, nodes, visited, request)]
     best = min(exact, key=lambda each: asymmetry(each, plane), default=None)

@@ -103,7 +103,6 @@ def test_without_clearance_it_only_does_not_cross(plate, line):
     assert 0.0 < distance_in_plane(design.curves[0], line.curves[0]) < 0.005
 
 
-@pytest.mark.slow
 def test_the_barrier_covers_the_whole_curve(ball):
     """Also where the curve runs close to edges, so that the strip beside it is very narrow."""
     around = np.array([[1.0, 0.1, 0.0], [-0.6, 0.8, 0.2], [-0.4, -0.9, 0.1]])
@@ -118,6 +117,7 @@ def test_the_barrier_covers_the_whole_curve(ball):
     assert away.min() > 1e-8
 
 
+@pytest.mark.slow
 def test_it_goes_round_the_end(plate, line):
     points = flat((0.45, 0.1), (0.45, -0.1))
     design = nicmm.design_curve(plate, points, closed=False, avoid=[line], clearance=CLEARANCE)
