@@ -13,9 +13,7 @@ from ..geometry.curve import SurfaceCurve, curve_on_mesh, points_of
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_between
-
-DETOUR = 2.0
-"""Greatest length of a straight trace relative to the distance of its ends in space."""
+from ..relaxation.node_traces import DETOUR
 
 
 def straight_at_junctions(
