@@ -71,13 +71,13 @@ KINKED = 200.0
 FURTHER_SEARCHES = 3
 """Greatest number of repeated searches for the whole curve."""
 
-COURSES_OF_A_SEARCH = 3
+COURSES_OF_A_SEARCH = 4
 """Greatest number of courses relaxed after a search whose curves are strongly bent.
 
 The order of their energies with few nodes is unreliable.
 """
 
-COMBINED_COURSES = 3
+COMBINED_COURSES = 4
 """Greatest number of courses relaxed that combine legs of all searches."""
 
 SEARCHES_FOR_PARTS = 16
@@ -98,20 +98,21 @@ LEAST_GAIN = 0.02
 """Decrease of the energy, relative to the elastic energy, below which a search has gained nothing.
 """
 
-MOST_WORK = 3_300
+MOST_WORK = 9_000
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes. It takes one to two seconds, and more than three on rough meshes.
+In moves of all nodes of a curve, of which 4,000 take about a second. The next constants are the
+measured times of searches in this unit.
 """
 
-WORK_OF_SEARCH = 30
-"""Approximate work of a search, in the same unit; as much again for each control or via point."""
+WORK_OF_SEARCH, WORK_OF_POINT = 400, 100
+"""Approximate work of a search, in the same unit, and what each control or via point adds."""
 
-WORK_OF_PART = 100
+WORK_OF_PART = 400
 """Approximate work of a search for a part, in the same unit, or of combining the courses of all
 searches."""
 
-WORK_OF_TRANSFER = 20
+WORK_OF_TRANSFER = 40
 """Approximate work of transferring a course from the coarse mesh, in the same unit."""
 
 MAX_COURSES_RELAXED = 10
@@ -480,7 +481,7 @@ class Improvement:
     @property
     def _work_of_search(self) -> int:
         via_points = sum(map(len, self.request.via_points.values()))
-        return WORK_OF_SEARCH * (1 + len(self.request.points) + via_points)
+        return WORK_OF_SEARCH + WORK_OF_POINT * (len(self.request.points) + via_points)
 
     def _is_affordable(self, further: float) -> bool:
         return self._work + further <= MOST_WORK

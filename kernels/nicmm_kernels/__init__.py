@@ -8,7 +8,12 @@ Python. While it computes, other threads of Python run.
 
 from .crossings import meeting_segments, polyline_crossings
 from .distinct_curves import distinct_curves
-from .edge_paths import EdgeGraphArrays, distances_along_edges, points_on_edge_paths
+from .edge_paths import (
+    EdgeGraphArrays,
+    distances_along_edges,
+    paths_along_edges,
+    points_on_edge_paths,
+)
 from .hops import FoundHops, HopPlaces, surface_hops
 from .least_sums import least_sums
 from .legs import PathArrays, best_legs, cell_sets, distinct_routes
@@ -90,6 +95,7 @@ __all__ = [
     "least_sums",
     "meeting_segments",
     "nearest_places",
+    "paths_along_edges",
     "place_nodes",
     "place_on_polyline",
     "places_on_traces",

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from . import library
 from .library import (
     COUNT,
     FLOAT,
     INT,
     NUMBER,
     POINTER,
+    BoolArray,
     FloatArray,
     IntArray,
     Kernel,
@@ -22,7 +24,7 @@ from .library import (
     in_several_calls,
     rows,
 )
-from .traces import MeshArrays, MeshPointers
+from .traces import FoundTraces, MeshArrays, MeshPointers, PointList
 
 
 class EdgeGraphPointers(ctypes.Structure):
@@ -50,6 +52,19 @@ class _EdgePoints(ctypes.Structure):
     ]
 
 
+class _PointPaths(ctypes.Structure):
+    _fields_ = [
+        ("q", COUNT),
+        ("start_faces", POINTER),
+        ("starts", POINTER),
+        ("end_faces", POINTER),
+        ("ends", POINTER),
+        ("longest", POINTER),
+        ("reached", POINTER),
+        ("counts", POINTER),
+    ]
+
+
 RESUMED = (POINTER, COUNT, COUNT, ctypes.POINTER(COUNT))
 _EDGE_GRAPH = Kernel("edge_graph", MeshPointers, EdgeGraphPointers, POINTER)
 _SEARCH_ITEMS = Kernel("edge_search_items", COUNT)
@@ -58,6 +73,9 @@ _DISTANCES = Kernel(
 )
 _POINTS_ON_PATHS = Kernel(
     "points_on_edge_paths", MeshPointers, EdgeGraphPointers, _EdgePoints, *RESUMED
+)
+_PATHS = Kernel(
+    "paths_along_edges", MeshPointers, EdgeGraphPointers, _PointPaths, PointList, *RESUMED
 )
 
 
@@ -156,3 +174,47 @@ def points_on_edge_paths(
     before = (graph.mesh.pointers, graph.pointers, points)
     in_several_calls(_POINTS_ON_PATHS, q, before, graph.scratch(), meanwhile)
     return faces, barycentric
+
+
+def paths_along_edges(
+    graph: EdgeGraphArrays,
+    starts: tuple[IntArray, FloatArray],
+    ends: tuple[IntArray, FloatArray],
+    longest: FloatArray,
+    meanwhile: Callable[[], object],
+) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+    """Shortest paths along edges between q pairs of points, which are joined to their corners.
+
+    Parameters
+    ----------
+    graph : EdgeGraphArrays
+    starts, ends : tuple of (q,) int array and (q, 3) float array
+        Faces of the points and barycentric coordinates in them.
+    longest : (q,) float array
+        Lengths up to which paths are searched for, in mesh units.
+    meanwhile : callable
+        Called between two calls of the kernel, at least after every `MOST_WORK` arcs.
+
+    Returns
+    -------
+    (q,) bool array
+        Whether there is a path.
+    (q,) int array
+        Number of points of each path, with its start and without its end; 0 if there is none.
+    (p,) int array, (p, 3) float array
+        The points in order: the face of the segment after each, and coordinates in it.
+    """
+    q = rows("longest", longest)
+    found, scratch = FoundTraces(q, graph.vertex_count + 2), graph.scratch()
+    paths = _PointPaths(
+        q, address("start faces", starts[0], INT, q), address("starts", starts[1], FLOAT, q, 3),
+        address("end faces", ends[0], INT, q), address("ends", ends[1], FLOAT, q, 3),
+        address("longest", longest, FLOAT, q),
+        found.reached.ctypes.data, found.counts.ctypes.data,
+    )  # fmt: skip
+    while found.next_call(meanwhile):
+        _PATHS(
+            graph.mesh.pointers, graph.pointers, paths, found.crossings, scratch.ctypes.data,
+            len(scratch), library.MOST_WORK, found.done,
+        )  # fmt: skip
+    return found.result()

@@ -3,7 +3,7 @@
    Of several paths of the same length, the one whose last vertex but one comes first counts: that
    at the smaller distance, or of the lower index. */
 #include "edge_paths.h"
-#include "vectors.h"
+#include "points.h"
 
 static int add_arc(const EdgeGraph *graph, int64_t start, int64_t end, int64_t face,
                    int64_t *places)
@@ -224,6 +224,130 @@ EXPORTED int points_on_edge_paths(const Mesh *mesh, const EdgeGraph *graph,
     for (; *done < points->q && work < most_work; ++*done) {
         CHECK(*done, points->q);
         TRY(point_on_path(mesh, graph, &search, points, *done, &work));
+    }
+    return OK;
+}
+
+/* Paths from points of faces to others. */
+typedef struct {
+    int64_t q;
+    const int64_t *start_faces;
+    const double *starts; /* (q, 3) barycentric coordinates in these faces */
+    const int64_t *end_faces;
+    const double *ends;    /* (q, 3) */
+    const double *longest; /* (q) lengths up to which paths are searched for */
+    uint8_t *reached;      /* (q) become whether there is a path */
+    int64_t *counts;       /* (q) become numbers of points of the paths */
+} PointPaths;
+
+/* A point of a face, and the straight ways to its corners. */
+typedef struct {
+    int64_t face;
+    const double *barycentric; /* (3) */
+    int64_t vertices[3];
+    double away[3]; /* zero if the point lies at the vertex */
+} JoinedPoint;
+
+static int join_point(const Mesh *mesh, int64_t face, const double *barycentric,
+                      JoinedPoint *point)
+{
+    double position[3];
+    point->face = face;
+    point->barycentric = barycentric;
+    TRY(position_in_face(mesh, face, barycentric, position));
+    for (int j = 0; j < 3; j++) {
+        TRY(vertex_at(mesh, 3 * face + j, &point->vertices[j]));
+        int is_vertex = barycentric[j] >= 1.0;
+        double away = distance_between(position, mesh->vertices + 3 * point->vertices[j]);
+        point->away[j] = is_vertex ? 0.0 : away;
+    }
+    return OK;
+}
+
+static int lies_at(const JoinedPoint *point, int64_t vertex)
+{
+    for (int j = 0; j < 3; j++)
+        if (point->vertices[j] == vertex) return point->barycentric[j] >= 1.0;
+    return 0;
+}
+
+/* Finds the last vertex of the shortest path to a point, or -1 if there is no path. */
+static int last_on_path(const EdgeGraph *graph, Search *search, const JoinedPoint *end,
+                        double longest, int64_t *last, int64_t *work)
+{
+    double least = INFINITY;
+    int64_t vertex;
+    *last = -1;
+    for (;;) {
+        TRY(next_vertex(graph, longest, search, &vertex, work));
+        if (vertex < 0 || search->distances[vertex] >= least) return OK;
+        for (int j = 0; j < 3; j++) {
+            double length = search->distances[vertex] + end->away[j];
+            if (end->vertices[j] != vertex || length > longest || length >= least) continue;
+            least = length;
+            *last = vertex;
+        }
+    }
+}
+
+/* Adds the points of a path but its end, each in the face of the segment after it. A start at a
+   vertex is not repeated; nor is an end. */
+static int add_path(const Mesh *mesh, const EdgeGraph *graph, const Search *search,
+                    const JoinedPoint *start, const JoinedPoint *end, int64_t last,
+                    PointList *points)
+{
+    int64_t first = last, length = 1;
+    for (; search->previous[first] >= 0; first = search->previous[first]) length++;
+    int64_t before = !lies_at(start, first), after = !lies_at(end, last);
+    if (length + before + after == 1) before = 1; /* start and end are the same vertex */
+    int64_t begin = points->count, added = before + length - 1 + after;
+    if (points->room - begin < added) return ARRAY_TOO_SMALL;
+    points->count += added;
+    if (before) {
+        points->faces[begin] = start->face;
+        memcpy(points->barycentric + 3 * begin, start->barycentric, 3 * sizeof(double));
+    }
+    int64_t vertex = last, face = end->face;
+    for (int64_t i = begin + before + length - 1; i >= begin + before; i--) {
+        if (i < begin + added) {
+            points->faces[i] = face;
+            TRY(place_between(mesh, face, vertex, vertex, 0.0, points->barycentric + 3 * i));
+        }
+        if (search->arcs[vertex] >= 0) face = graph->faces[search->arcs[vertex]];
+        vertex = search->previous[vertex];
+    }
+    return OK;
+}
+
+/* Finds the shortest paths along edges between points, from the path of index `done` on. Points are
+   joined to the corners of their faces.
+
+   It returns early after `most_work` arcs, or when the room that is left may not suffice for the
+   next path; `done` is raised to the number of finished paths. */
+EXPORTED int paths_along_edges(const Mesh *mesh, const EdgeGraph *graph, const PointPaths *paths,
+                               PointList *points, double *scratch, int64_t scratch_items,
+                               int64_t most_work, int64_t *done)
+{
+    Scratch memory = {scratch, scratch_items};
+    Search search;
+    int64_t work = 0, last;
+    TRY(take_search(&memory, graph->vertex_count, &search));
+    for (; *done < paths->q && work < most_work; ++*done) {
+        CHECK(*done, paths->q);
+        int64_t i = *done, begin = points->count;
+        if (begin > 0 && points->room - begin <= graph->vertex_count) return OK;
+        JoinedPoint start, end;
+        TRY(join_point(mesh, paths->start_faces[i], paths->starts + 3 * i, &start));
+        TRY(join_point(mesh, paths->end_faces[i], paths->ends + 3 * i, &end));
+        for (int j = 0; j < 3; j++) {
+            if (start.away[j] > paths->longest[i]) continue;
+            TRY(reach(&search, start.vertices[j], start.away[j], -1, -1));
+        }
+        TRY(last_on_path(graph, &search, &end, paths->longest[i], &last, &work));
+        if (last >= 0) TRY(add_path(mesh, graph, &search, &start, &end, last, points));
+        paths->reached[i] = last >= 0;
+        paths->counts[i] = points->count - begin;
+        TRY(end_search(&search));
     }
     return OK;
 }

@@ -55,14 +55,6 @@ class CoarseMesh:
         entries = (np.ones(len(inside), dtype=np.int8), (self.cell[inside], inside))
         return sparse.csr_array(entries, shape=(len(self.seed), len(self.cell)))
 
-    def faces_of_cells(self, fine: Mesh, vertices: IntArray) -> IntArray:
-        """Fine faces at the fine vertices in the cells of coarse vertices, ascending."""
-        return fine.faces_at(self._vertices_of_cells[vertices].indices)
-
-    def cells_around(self, vertices: IntArray) -> IntArray:
-        """The cells of coarse vertices and their neighbours, as ascending coarse vertices."""
-        return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
-
     def greatest_in_cells(self, values: FloatArray) -> FloatArray:
         """The greatest of the weights at fine vertices, (V,), in each cell, shape (n,).
 

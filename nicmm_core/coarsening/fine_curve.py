@@ -7,11 +7,8 @@ on that side.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from ..geometry.array_types import IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.discrete_curve import DiscreteCurve
@@ -37,12 +34,6 @@ def nodes_on_fine_mesh(
     fine, places = surface.mesh, coarse_curve.nodes.places
     cell = coarse.mesh.faces[places.faces, places.barycentric.argmax(axis=1)]
 
-    def cells_around(faces: IntArray) -> Iterator[IntArray]:
-        cells = np.unique(coarse.cell[fine.faces[faces, 0]])
-        for _ in range(3):  # rings in which a path between two nodes is searched for
-            cells = coarse.cells_around(cells)
-            yield coarse.faces_of_cells(fine, cells)
-
     return simple_curve(
         surface,
         coarse.nearest_fine_points(fine, places.positions(coarse.mesh), cell),
@@ -51,6 +42,5 @@ def nodes_on_fine_mesh(
         coarse_curve.closed,
         # Normals of the coarse mesh, since they ignore small dents that a trace has to cross.
         normals=coarse_curve.nodes.normals,
-        neighbourhoods=cells_around,
         corners=np.isin(coarse_curve.control_nodes, coarse_curve.corner_nodes),
     )

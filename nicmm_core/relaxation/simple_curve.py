@@ -8,34 +8,25 @@ mesh has cut off, the curve crosses itself in small loops; their nodes are remov
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
 
+import nicmm_kernels
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
-from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
-from ..geometry.grouping import path_between
-from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
 from .discrete_curve import DiscreteCurve, noded, traced_polyline
+from .node_traces import LONGEST_BYPASS
 
 ROUNDS = 4
 """Rounds in which loops are removed; traces between the remaining nodes may cross again."""
 
-RINGS = (2, 4, 8)
-"""Numbers of rings of faces around two nodes in which a path between them is searched for."""
-
 Paths = dict[tuple[int, int], SurfacePoints]
 """Paths along edges by the numbers of their two nodes."""
-
-Neighbourhoods = Callable[[IntArray], Iterator[IntArray]]
-"""Yields growing sets of faces around the faces of two nodes, (2,)."""
 
 
 def simple_curve(
@@ -45,7 +36,6 @@ def simple_curve(
     controls: SurfacePoints,
     closed: bool,
     normals: FloatArray | None = None,
-    neighbourhoods: Neighbourhoods | None = None,
     corners: BoolArray | None = None,
 ) -> DiscreteCurve | None:
     """Join nodes to a simple curve through control points.
@@ -62,8 +52,6 @@ def simple_curve(
     closed : bool
     normals : (n, 3) float array, optional
         Normals at the nodes, which the planes of traces contain; by default those of the surface.
-    neighbourhoods : Neighbourhoods, optional
-        Where a path along edges is searched for; by default in rings of faces.
     corners : (k,) bool array, optional
         Control points at which the curve may turn freely.
 
@@ -76,13 +64,11 @@ def simple_curve(
     faces, barycentric = places.faces.copy(), strictly_inside(places.barycentric)
     faces[control_nodes], barycentric[control_nodes] = controls.faces, controls.barycentric
     places = SurfacePoints(faces, barycentric)
-    if neighbourhoods is None:
-        neighbourhoods = _rings(surface.mesh)
     numbers, paths = np.arange(len(places)), Paths()
     for _ in range(ROUNDS):
         checkpoint()
         bare = noded(surface, places, control_nodes, closed)
-        curve = _joined(surface, bare, normals, neighbourhoods, numbers, paths)
+        curve = _joined(surface, bare, normals, numbers, paths)
         if curve is None:
             return None
         crossings = crossing_segments(surface.mesh.faces, curve.polyline, closed)
@@ -101,7 +87,6 @@ def _joined(
     surface: CurveSurface,
     curve: DiscreteCurve,
     normals: FloatArray | None,
-    neighbourhoods: Neighbourhoods,
     numbers: IntArray,
     paths: Paths,
 ) -> DiscreteCurve | None:
@@ -114,20 +99,16 @@ def _joined(
     if normals is not None:
         traced = Nodes(nodes.places, nodes.closed, nodes.positions, normals, nodes.phi_fea)
     polyline, node_index, lost = traced_polyline(surface, curve, traced)
-    bypasses: dict[int, SurfacePoints] = {}
-    for node in np.flatnonzero(lost).tolist():
-        checkpoint()
-        following = (node + 1) % len(lost)
-        pair = int(numbers[node]), int(numbers[following])
-        if pair not in paths:
-            for inside in neighbourhoods(nodes.places.faces[[node, following]]):
-                path = _path_along_edges(surface.mesh, inside, nodes, node, following)
-                if path is not None:
-                    paths[pair] = path
-                    break
-            else:
-                return None
-        bypasses[node] = paths[pair]
+    pairs = {
+        node: (int(numbers[node]), int(numbers[(node + 1) % len(lost)]))
+        for node in np.flatnonzero(lost).tolist()
+    }
+    new = np.array([node for node, pair in pairs.items() if pair not in paths], dtype=np.int64)
+    found = _paths_along_edges(surface.mesh, nodes, new, (new + 1) % len(lost))
+    if found is None:
+        return None
+    paths.update((pairs[node], path) for node, path in zip(new.tolist(), found, strict=True))
+    bypasses = {node: paths[pair] for node, pair in pairs.items()}
     return _with_paths(curve, polyline, node_index, bypasses)
 
 
@@ -153,77 +134,31 @@ def _outside_loops(curve: DiscreteCurve, crossings: IntArray) -> BoolArray:
     return outside | control
 
 
-def _rings(mesh: Mesh) -> Neighbourhoods:
-    """Rings of faces around two faces."""
+def _paths_along_edges(
+    mesh: Mesh, nodes: Nodes, start: IntArray, end: IntArray
+) -> list[SurfacePoints] | None:
+    """The shortest paths along edges from some nodes to others, each without its end.
 
-    def neighbourhoods(faces: IntArray) -> Iterator[IntArray]:
-        count = 0
-        for rings in RINGS:
-            while count < rings:
-                faces = mesh.faces_at(np.unique(mesh.faces[faces]))
-                count += 1
-            yield faces
-
-    return neighbourhoods
-
-
-def _path_along_edges(
-    mesh: Mesh, inside: IntArray, nodes: Nodes, start: int, end: int
-) -> SurfacePoints | None:
-    """The shortest path along edges of given faces from one node to another, without its end.
-
-    None if there is no such path.
+    None if there is no path for one of them.
     """
-    vertices, faces = np.unique(mesh.faces[inside], return_inverse=True)
-    edges, _ = unique_edges(faces.reshape(-1, 3))
-    ends = nodes.places[np.array([start, end])]
-    place = {vertex: number for number, vertex in enumerate(vertices.tolist())}
-    here, there = len(vertices), len(vertices) + 1
-    links = [
-        (node, place[vertex], ends.faces[number], weight)
-        for number, node in enumerate((here, there))
-        for vertex, weight in zip(
-            mesh.faces[ends.faces[number]].tolist(), ends.barycentric[number], strict=True
-        )
-        if vertex in place
-    ]
-    positions = np.concatenate([mesh.vertices[vertices], nodes.positions[[start, end]]])
-    arcs = np.concatenate([edges, np.array([link[:2] for link in links]).reshape(-1, 2)])
-    length = np.linalg.norm(positions[arcs[:, 0]] - positions[arcs[:, 1]], axis=1)
-    size = len(positions)
-    # A sparse graph has no arc where the length is zero.
-    length = np.maximum(length, tolerances.TINY)
-    graph = sparse.csr_array((length, (arcs[:, 0], arcs[:, 1])), shape=(size, size))
-    _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
-    if previous[there] < 0:
+    if not len(start):
+        return []
+    places, positions = nodes.places, nodes.positions
+    corners = mesh.vertices[mesh.faces[places.faces]]
+    to_corners = np.linalg.norm(corners - positions[:, None], axis=2).max(axis=1)
+    apart = np.linalg.norm(positions[start] - positions[end], axis=1)
+    reached, counts, faces, barycentric = nicmm_kernels.paths_along_edges(
+        mesh.edge_graph,
+        places[start].for_kernels,
+        places[end].for_kernels,
+        LONGEST_BYPASS * apart + to_corners[start] + to_corners[end],
+        checkpoint,
+    )
+    if not reached.all():
         return None
-    path = path_between(previous, here, there)[1:-1]
-    return _points_of_path(mesh, ends, vertices[path].tolist())
-
-
-def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> SurfacePoints | None:
-    """A path along vertices as points, each in the face of the segment after it.
-
-    The first of the two ends is included, the second is not. None if a segment lies in no face.
-    """
-    weights = [
-        {vertex: weight for vertex, weight in zip(*point, strict=True) if weight > 0.0}
-        for point in zip(mesh.faces[ends.faces].tolist(), ends.barycentric.tolist(), strict=True)
-    ]
-    # An end that lies at a vertex of the path must not be repeated.
-    inner = [{vertex: 1.0} for vertex in path]
-    inner = inner[weights[0].keys() == {path[0]} :]
-    if inner and weights[1].keys() == {path[-1]}:
-        inner.pop()
-    stops = [weights[0], *inner, weights[1]]
-    faces, barycentric = [], []
-    for here, there in itertools.pairwise(stops):
-        common = mesh.faces_with(np.array([*here, *there]))
-        if not len(common):
-            return None
-        faces.append(common[0])
-        barycentric.append([here.get(corner, 0.0) for corner in mesh.faces[common[0]].tolist()])
-    return SurfacePoints(np.array(faces, dtype=np.int64), np.array(barycentric))
+    bounds = np.append(0, counts.cumsum())
+    points = SurfacePoints(faces, barycentric)
+    return [points[low:high] for low, high in itertools.pairwise(bounds.tolist())]
 
 
 def _with_paths(

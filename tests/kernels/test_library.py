@@ -317,6 +317,18 @@ def arguments_paths(q=12):
     }
 
 
+def arguments_point_paths(q=12):
+    """Arguments of `paths_along_edges` for q paths, by name."""
+    third = np.full((q, 3), 1.0 / 3.0)
+    return {
+        "graph": BALL.edge_graph,
+        "starts": (np.arange(q), third),
+        "ends": (40 + np.arange(q), third.copy()),
+        "longest": np.full(q, 10.0),
+        "meanwhile": nothing,
+    }
+
+
 def arguments_segments_in_faces(s=6):
     """Arguments of `distances_from_segments` for s separate segments and s points, by name."""
     third, half = np.full((s, 3), 1.0 / 3.0), np.tile([0.5, 0.3, 0.2], (s, 1))
@@ -481,6 +493,7 @@ CALLS = {
     "distances_along_edges": (nicmm_kernels.distances_along_edges, arguments_distances),
     "surface_hops": (nicmm_kernels.surface_hops, arguments_hops),
     "points_on_edge_paths": (nicmm_kernels.points_on_edge_paths, arguments_paths),
+    "paths_along_edges": (nicmm_kernels.paths_along_edges, arguments_point_paths),
     "distances_from_segments": (distances_from_segments, arguments_segments_in_faces),
     "refine_at_level": (refined, arguments_refinement),
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
@@ -527,6 +540,7 @@ INDICES = {
     "distances_along_edges": [("corners", None)],
     "surface_hops": [("places", 1)],
     "points_on_edge_paths": [("starts", None), ("ends", None)],
+    "paths_along_edges": [("starts", 0), ("ends", 0)],
     "turning_paths": [("onward", 1), ("leaving", 1), ("arriving", 1)],
     "best_legs": [("graph", 2), ("graph", 3)],
     "distinct_curves": [("order", None)],
@@ -570,6 +584,7 @@ RESUMED = [
     "distances_along_edges",
     "meeting_segments",
     "nearest_places",
+    "paths_along_edges",
     "points_on_edge_paths",
     "polyline_crossings",
     "relax_curves",
