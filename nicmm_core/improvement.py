@@ -16,8 +16,13 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
-from .courses.bent_part import bent_parts
-from .courses.comparison import distinct_by_energy, is_apart
+from .courses.bent_part import BentPart, bent_parts
+from .courses.comparison import (
+    PARTS_APART,
+    distinct_by_energy,
+    farthest_between,
+    is_apart,
+)
 from .courses.course_search import COMBINED, Search
 from .courses.course_set import CourseSet
 from .errors import NicmmError
@@ -71,20 +76,20 @@ KINKED = 200.0
 FURTHER_SEARCHES = 3
 """Greatest number of repeated searches for the whole curve."""
 
-COURSES_OF_A_SEARCH = 4
+COURSES_OF_A_SEARCH = 6
 """Greatest number of courses relaxed after a search whose curves are strongly bent.
 
 The order of their energies with few nodes is unreliable.
 """
 
-COMBINED_COURSES = 4
+COMBINED_COURSES = 6
 """Greatest number of courses relaxed that combine legs of all searches."""
 
 SEARCHES_FOR_PARTS = 16
 """Greatest number of searches for parts of the best curve.
 
-Each takes a sixth of the time of a search for the whole curve, and where curves bend far more than
-a circle, it gains more.
+Each takes less than half the time of a search for the whole curve, and where curves bend far more
+than a circle, it gains more.
 """
 
 COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
@@ -98,7 +103,7 @@ LEAST_GAIN = 0.02
 """Decrease of the energy, relative to the elastic energy, below which a search has gained nothing.
 """
 
-MOST_WORK = 9_000
+MOST_WORK = 10_000
 """Work of all attempts together above which no further one is begun.
 
 In moves of all nodes of a curve, of which 4,000 take about a second. The next constants are the
@@ -323,8 +328,8 @@ class Improvement:
 
     def _try_other_parts(self) -> None:
         """Try the best curve with other courses in the parts that bend most."""
-        changed = self.best
-        parts = bent_parts(self.curves[changed])
+        changed, in_vain = self.best, list[FloatArray]()
+        parts = self._bent_parts(self.curves[changed], in_vain)
         for _ in range(SEARCHES_FOR_PARTS):
             part = next(parts, None)
             if part is None or not self._should_try_another_part():
@@ -340,7 +345,20 @@ class Improvement:
                 self.attempt(start, self._limited(WARM))
             if self._gained_since(before):
                 changed = self.best
-                parts = bent_parts(self.curves[changed])
+                parts = self._bent_parts(self.curves[changed], in_vain)
+            else:
+                in_vain.append(part.positions(curve))
+
+    def _bent_parts(self, curve: DiscreteCurve, in_vain: list[FloatArray]) -> Iterator[BentPart]:
+        """The parts of a curve that bend most, except for those that were searched in vain.
+
+        The latter are given by the positions of their nodes.
+        """
+        limit = PARTS_APART * self._surface.mesh.diagonal
+        for part in bent_parts(curve):
+            positions = part.positions(curve)
+            if all(farthest_between(positions, each) > limit for each in in_vain):
+                yield part
 
     @property
     def curves(self) -> list[DiscreteCurve]:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 
 import numpy as np
 
-from ..geometry.array_types import IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.surface_points import joined
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.discrete_curve import DiscreteCurve
@@ -61,19 +60,28 @@ class BentPart:
     last: int
     length: float
 
+    def positions(self, curve: DiscreteCurve) -> FloatArray:
+        """Positions of the nodes of the curve from the first node in `passed` to the last."""
+        count = len(curve.nodes.positions)
+        first, last = self.passed[0], self.passed[-1]
+        among = (first + np.arange((last - first) % count + 1)) % count
+        result: FloatArray = curve.nodes.positions[among]
+        return result
+
 
 def bent_parts(curve: DiscreteCurve) -> Iterator[BentPart]:
     """Yield the parts of a curve that bend most.
 
-    In turn, they are the part around a bend and the two legs at a control point.
+    They are the parts around bends, then the two legs at each control point, which hardly ever bend
+    less in another way.
 
     Parameters
     ----------
     curve : DiscreteCurve
     """
     turned = _Turned(curve)
-    for pair in zip_longest(_around_bends(turned), _legs_at_points(turned)):
-        yield from (part for part in pair if part is not None)
+    yield from _around_bends(turned)
+    yield from _legs_at_points(turned)
 
 
 class _Turned:

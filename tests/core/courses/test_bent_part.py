@@ -106,14 +106,15 @@ def test_bends_are_apart(surface):
         assert np.linalg.norm(one - other) >= 0.95 * APART * curve.length  # a node nearby
 
 
-def test_the_legs_at_the_most_bent_control_point_come_first(surface):
+def test_bends_come_before_legs_and_those_of_the_most_bent_control_point_first(surface):
     """The bend is at node 60, between the control points 55 and 80."""
     curve = wavy_curve(surface, True)
     parts = two_legs(curve)
     assert len(parts) == len(curve.control_nodes)
     inside = [part.passed[part.first + 1 : part.last].tolist() for part in parts]
     assert sorted(inside[:2]) == [[55], [80]]
-    assert list(bent_parts(curve))[1].passed.tolist() == parts[0].passed.tolist()
+    in_order = [part.passed.tolist() for part in bent_parts(curve)]
+    assert in_order[-len(parts) :] == [part.passed.tolist() for part in parts]
 
 
 def test_an_end_of_an_open_curve_has_one_leg(surface):
@@ -206,3 +207,15 @@ def test_searches_for_parts_are_bounded(monkeypatch):
     monkeypatch.setattr(improvement, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
     assert not tried
+
+
+@pytest.mark.parametrize(("closed", "shift"), [(True, 0), (True, 55), (False, 0)])
+def test_positions_of_a_part_run_along_the_curve(surface, closed, shift):
+    curve = wavy_curve(surface, closed, shift)
+    for part in bent_parts(curve):
+        positions = part.positions(curve)
+        ends = curve.nodes.positions[part.passed[[0, -1]]]
+        np.testing.assert_array_equal(positions[[0, -1]], ends)
+        assert np.linalg.norm(np.diff(positions, axis=0), axis=1).sum() == pytest.approx(
+            part.length, rel=0.05
+        )
