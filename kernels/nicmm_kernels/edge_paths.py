@@ -200,7 +200,7 @@ def paths_along_edges(
     (q,) bool array
         Whether there is a path.
     (q,) int array
-        Number of points of each path, with its start and without its end; 0 if there is none.
+        Number of points of each path, with its start and without its end; 0 without a path.
     (p,) int array, (p, 3) float array
         The points in order: the face of the segment after each, and coordinates in it.
     """

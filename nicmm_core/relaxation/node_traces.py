@@ -24,10 +24,8 @@ DETOUR = 3.0
 """Greatest length of a trace between two nodes, relative to their distance; longer ones fail."""
 
 LONGEST_BYPASS = 6.0
-"""Greatest length of a path along edges in place of a failed trace.
-
-It is relative to the greatest distance between two nodes without a trace.
-"""
+"""Greatest length of a path along edges in place of a failed trace, relative to the distance of its
+nodes. Where all paths have one limit, it is relative to the greatest of these distances."""
 
 
 @dataclass(frozen=True)

@@ -144,14 +144,15 @@ def _paths_along_edges(
     if not len(start):
         return []
     places, positions = nodes.places, nodes.positions
-    corners = mesh.vertices[mesh.faces[places.faces]]
-    to_corners = np.linalg.norm(corners - positions[:, None], axis=2).max(axis=1)
-    apart = np.linalg.norm(positions[start] - positions[end], axis=1)
+    longest = LONGEST_BYPASS * np.linalg.norm(positions[start] - positions[end], axis=1)
+    for node in (start, end):  # a path begins and ends with a way to a corner
+        corners = mesh.vertices[mesh.faces[places.faces[node]]]
+        longest += np.linalg.norm(corners - positions[node, None], axis=2).max(axis=1)
     reached, counts, faces, barycentric = nicmm_kernels.paths_along_edges(
         mesh.edge_graph,
         places[start].for_kernels,
         places[end].for_kernels,
-        LONGEST_BYPASS * apart + to_corners[start] + to_corners[end],
+        longest,
         checkpoint,
     )
     if not reached.all():
