@@ -28,6 +28,7 @@ from .levels import (
     place_on_polyline,
 )
 from .library import KernelError, MissingLibraryError
+from .matrix_product import matrix_product
 from .mesh_measures import area_vectors, connected_components, edge_lengths
 from .nearest_places import nearest_places
 from .node_traces import StepLimits, trace_polyline, trace_steps
@@ -93,6 +94,7 @@ __all__ = [
     "even_places",
     "find_contacts",
     "least_sums",
+    "matrix_product",
     "meeting_segments",
     "nearest_places",
     "paths_along_edges",

@@ -17,6 +17,7 @@ from ..blas_threads import single_blas_thread
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from .level_set_solver import SolverConfig, minimise
 from .losses import LossWeights
+from .matrix_product import product
 from .narrow_band import NarrowBand
 from .network import Network, NetworkInput, corrections, held_attention, level_set, network_input
 from .problem import Problem
@@ -104,19 +105,21 @@ class NetworkSteps:
         inputs = self._inputs
         n_unknowns, n_controls = len(band.unknowns), len(inputs.control_vertices)
         rows = np.concatenate([band.unknowns, inputs.control_vertices])
-        self._response = inputs.response[band.unknowns]  # (u, k)
+        self._response = inputs.response[band.unknowns].astype(float)  # (u, k)
         self._features = inputs.features[rows]
         self._tangent = tangent(self._network, self._features, self._attention)
         marks = self._marks(beside)
         self._columns = np.concatenate([marks, n_unknowns + np.arange(n_controls)])
         of_marks = kernel(self._network, self._tangent, self._columns).astype(float)
-        of_marks = of_marks[:n_unknowns] - self._response @ of_marks[n_unknowns:]
-        of_marks = of_marks[:, : len(marks)] - of_marks[:, len(marks) :] @ self._response[marks].T
+        of_marks = of_marks[:n_unknowns] - product(self._response, of_marks[n_unknowns:])
+        of_marks = of_marks[:, : len(marks)] - product(
+            of_marks[:, len(marks) :], self._response[marks].T
+        )
         at_marks = 0.5 * (of_marks[marks] + of_marks[marks].T)
         at_marks[np.diag_indices_from(at_marks)] += ROUNDING * np.trace(at_marks)
         self._root = linalg.cholesky(at_marks, lower=True)  # (s, s)
         self._changes = linalg.solve_triangular(self._root, of_marks.T, lower=True).T  # (u, s)
-        self._hessian = self._changes.T @ (hessian @ self._changes)
+        self._hessian = product(self._changes.T, hessian @ self._changes)
         self._gradient = self._changes.T @ gradient
         self._stiffness = STIFFNESS * float(np.median(hessian.diagonal()))
         self._marked = marks
@@ -136,7 +139,7 @@ class NetworkSteps:
     def solve(self, damping: float, held: BoolArray) -> FloatArray:
         """Solve the damped system for the parameters; vertices are held by a large weight."""
         of_held = self._changes[held]
-        system = self._hessian + self._stiffness * (of_held.T @ of_held)
+        system = self._hessian + self._stiffness * product(of_held.T, of_held)
         system[np.diag_indices_from(system)] += damping
         self._solution = -linalg.solve(system, self._gradient, assume_a="pos")
         return self._changes @ self._solution

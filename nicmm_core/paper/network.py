@@ -17,6 +17,7 @@ import numpy as np
 
 from ..geometry.array_types import Array
 from .features import BASE_CHANNELS
+from .matrix_product import product
 from .problem import Problem
 
 POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)
@@ -312,7 +313,7 @@ def blocks(
         scaled = activated * weights  # (r, C)
         lowered, gate = None, 1.0
         if config.gating:
-            lowered = scaled @ parameters[f"{name}.gate_down.weight"].T  # (r, rank)
+            lowered = product(scaled, parameters[f"{name}.gate_down.weight"].T)  # (r, rank)
             gate = _sigmoid(_linear(parameters, f"{name}.gate_up", lowered), xp)  # (r, C)
         value = _linear(parameters, f"{name}.value", scaled)  # (r, C)
         yield (values := BlockValues(hidden, activated, weights, lowered, gate, value))
@@ -326,7 +327,7 @@ def head(network: Network, hidden: Array) -> Array:
 
 def _linear(parameters: dict[str, Array], name: str, values: Array) -> Array:
     """A linear layer, from (r, in) to (r, out)."""
-    return values @ parameters[f"{name}.weight"].T + parameters[f"{name}.bias"]
+    return product(values, parameters[f"{name}.weight"].T) + parameters[f"{name}.bias"]
 
 
 def _sigmoid(values: Array, xp: ModuleType) -> Array:

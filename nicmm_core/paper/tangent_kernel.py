@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
+from .matrix_product import product
 from .network import Attention, BlockValues, Network, blocks, head
 
 
@@ -59,7 +60,7 @@ def tangent(network: Network, features: FloatArray, attention: Attention) -> Tan
     hidden = values[-1].output
     derivative = np.ones((len(hidden), 1), dtype=hidden.dtype)
     layers = [Layer("head", hidden, derivative)]
-    derivative = derivative @ parameters["head.weight"]  # (r, C)
+    derivative = product(derivative, parameters["head.weight"])  # (r, C)
     for block in reversed(range(network.config.depth)):
         derivative = _through_block(network, block, values[block], derivative, layers)
     derivative = derivative * (1.0 - values[0].hidden ** 2)
@@ -78,27 +79,29 @@ def _through_block(
     scaled = values.activated * values.attention
     for_value = derivative * values.gate
     layers.append(Layer(f"{name}.value", scaled, for_value))
-    for_scaled = for_value @ parameters[f"{name}.value.weight"]
+    for_scaled = product(for_value, parameters[f"{name}.value.weight"])
     if values.lowered is not None:
         for_gate = derivative * values.value * values.gate * (1.0 - values.gate)
-        layers.append(Layer(f"{name}.gate_up", values.lowered, for_gate))
-        for_lowered = for_gate @ parameters[f"{name}.gate_up.weight"]
+        for_lowered = product(for_gate, parameters[f"{name}.gate_up.weight"])
         layers.append(Layer(f"{name}.gate_down", scaled, for_lowered))
-        for_scaled = for_scaled + for_lowered @ parameters[f"{name}.gate_down.weight"]
+        layers.append(Layer(f"{name}.gate_up", values.lowered, for_gate))
+        for_scaled = for_scaled + product(for_lowered, parameters[f"{name}.gate_down.weight"])
     for_linear = for_scaled * values.attention * (1.0 - values.activated**2)
     layers.append(Layer(f"{name}.linear", values.hidden, for_linear))
-    return derivative + for_linear @ parameters[f"{name}.linear.weight"]
+    return derivative + product(for_linear, parameters[f"{name}.linear.weight"])
 
 
 def kernel(network: Network, tangent: Tangent, columns: IntArray) -> FloatArray:
     """Columns of the tangent kernel, shape (r, s), for s of the r vertices."""
     result = np.zeros((len(tangent.correction), len(columns)), dtype=tangent.correction.dtype)
+    shared, of_inputs = None, result
     for name, inputs, derivatives in tangent.layers:
-        products = inputs @ inputs[columns].T
+        if inputs is not shared:  # two layers may have one input
+            shared, of_inputs = inputs, product(inputs, inputs[columns].T)
+        of_derivatives = product(derivatives, derivatives[columns].T)
+        result += of_inputs * of_derivatives
         if f"{name}.bias" in network.parameters:
-            products += 1.0
-        products *= derivatives @ derivatives[columns].T
-        result += products
+            result += of_derivatives
     return result
 
 
@@ -110,7 +113,8 @@ def moved(
     alpha = coefficients.astype(tangent.correction.dtype)
     for name, inputs, derivatives in tangent.layers:
         weighted = derivatives[columns] * alpha[:, None]  # (s, out)
-        parameters[f"{name}.weight"] = parameters[f"{name}.weight"] + weighted.T @ inputs[columns]
+        change = product(weighted.T, inputs[columns])
+        parameters[f"{name}.weight"] = parameters[f"{name}.weight"] + change
         if f"{name}.bias" in parameters:
             parameters[f"{name}.bias"] = parameters[f"{name}.bias"] + weighted.sum(axis=0)
     return Network(network.config, parameters)

@@ -55,6 +55,7 @@ def designs() -> Iterator[Callable[[], object]]:
     yield lambda: nicmm.design_curve(ring, [5, 90, 200], closed=False, alignment=height.clip(0))
     yield lambda: nicmm.design_curve(ring, [5, 90, 200], obstacles=(height > 0.9).astype(float))
     yield lambda: nicmm.design_curve(folded, [12, 80, 41, 150])
+    yield lambda: nicmm.design_curve(shapes.sphere(1), [0, 5, 9], method="nicmm")
     yield lambda: _drag_a_point(body)
 
 
