@@ -69,14 +69,14 @@ PAPER_FEATURES = {ALL_FEATURES: 32.0, "w/o normals": 35.4, "w/o φ_p": 75.4, "w/
 def measure(scale: Scale) -> Results:
     """Pretrain all variants alike on one mesh and fit them to other sets of that mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
-    sets, epochs = scale.choose(100, 6, 4), scale.choose(10, 2)
+    sets, epochs = scale.choose(100, 6, 2), scale.choose(10, 2)
     networks, seconds = _pretrained({**MODULES, **FEATURES}, mesh, sets, epochs)
     runs = run_networks(
         {label: networks[label] for label in MODULES},
         random_samples([(name, mesh)], scale.choose(40, 2), TEST_SEED),
         ITERATIONS,
     )
-    cap = scale.choose(CONVERGENCE.iterations, 40, 20)
+    cap = scale.choose(CONVERGENCE.iterations, 40, 12)
     stops = _early_stops(
         {label: networks[label] for label in FEATURES}, name, mesh, scale.choose(10, 1), cap
     )

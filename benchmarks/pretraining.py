@@ -40,14 +40,14 @@ PAPER_TRAINING = 1000 * 10
 def measure(scale: Scale) -> Results:
     """Pretrain for several durations and fit the networks to other sets of the same mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
-    sets = scale.choose(250, 10, 4)
+    sets = scale.choose(250, 10, 2)
     trained = {_label(sets, epochs): train(mesh, sets, epochs, SEED) for epochs in _epochs(scale)}
     networks = {
         UNTRAINED: initial_network(),
         **{label: one.network for label, one in trained.items()},
         SHIPPED: load_network(),
     }
-    samples = random_samples([(name, mesh)], scale.choose(50, 2, 2), TEST_SEED)
+    samples = random_samples([(name, mesh)], scale.choose(50, 2), TEST_SEED)
     return {
         "collection": collections.label(scale),
         "mesh": name,

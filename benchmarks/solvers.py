@@ -41,7 +41,7 @@ def measure(scale: Scale) -> Results:
 
     The solvers take turns on each set, so that other load on the machine slows all alike.
     """
-    solvers = _solvers(AdamWConfig(iterations=scale.choose(AdamWConfig.iterations, 100, 30)))
+    solvers = _solvers(AdamWConfig(iterations=scale.choose(AdamWConfig.iterations, 100, 12)))
     sets: list[Results] = []
     meshes = collections.surfaces(scale, scale.choose(24, 4))
     for sample in random_samples(meshes, 1, SEED):

@@ -4,6 +4,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+from dataclasses import replace
 from itertools import chain, islice
 
 import matplotlib.image
@@ -13,17 +14,23 @@ from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core import improvement
+from nicmm_core.paper import fitting, variational
 
 pytestmark = pytest.mark.slow
 
 FEW_STEPS = 4
+FEW_ITERATIONS = 12
 FEW_MESHES = 6
 
 
 @pytest.fixture(autouse=True)
 def short_computations(monkeypatch):
-    """Few attempts, meshes, and steps of reference curves; they take longest."""
+    """Few attempts, meshes, iterations, and steps of reference curves; they take longest."""
     monkeypatch.setattr(improvement, "MOST_WORK", 0)
+    for function in (fitting.fit, variational.solve):
+        config, watch = function.__defaults__
+        few_iterations = replace(config, iterations=FEW_ITERATIONS)
+        monkeypatch.setattr(function, "__defaults__", (few_iterations, watch))
     monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
     few = list(islice(corpus.defective_meshes(), FEW_MESHES))
     monkeypatch.setattr(corpus, "defective_meshes", lambda: iter(few))
