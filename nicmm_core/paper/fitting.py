@@ -25,13 +25,14 @@ from .solution import Solution
 from .tangent_kernel import kernel, moved, tangent
 from .topology import keep_topology
 
-CONVERGENCE = SolverConfig(settling=5, patience=7, relative_tolerance=0.005)
+CONVERGENCE = SolverConfig(settling=5, patience=7, relative_tolerance=0.01)
 """The paper stops at "minimal fluctuations" of the energy in the band; here, when it falls by less
-than 0.5 % in seven iterations after the solver has settled. The energy is then within 2 % of that
-after 70 iterations on 48 of 51 sets that did not choose this rule."""
+than 1 % in seven iterations after the solver has settled. The energy is then within 2 % of that
+after 100 iterations on 50 of 51 sets that did not choose this rule."""
 
-MARKS = 120
-"""Number of vertices along whose derivatives the parameters are moved (Nyström's method)."""
+MARKS = 90
+"""Number of vertices along whose derivatives the parameters are moved (Nyström's method). With 70
+to 200 of them, curves are equally fair."""
 
 NEAR_SHARE = 0.6
 """Least fraction of these vertices that lies beside the curve."""

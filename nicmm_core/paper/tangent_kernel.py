@@ -99,9 +99,10 @@ def kernel(network: Network, tangent: Tangent, columns: IntArray) -> FloatArray:
         if inputs is not shared:  # two layers may have one input
             shared, of_inputs = inputs, product(inputs, inputs[columns].T)
         of_derivatives = product(derivatives, derivatives[columns].T)
-        result += of_inputs * of_derivatives
         if f"{name}.bias" in network.parameters:
             result += of_derivatives
+        of_derivatives *= of_inputs
+        result += of_derivatives
     return result
 
 

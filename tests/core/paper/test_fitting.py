@@ -187,7 +187,7 @@ def test_result_is_one_curve_through_all_points(surface, closed, guide):
     located = locate_control_points(surface, points, closed=closed)
     problem = build_problem(surface, located, "shortest", closed=closed, **maps)
     fitted = fit(
-        shipped_network(problem.features.shape[1]), problem, balanced(WEIGHTS, problem), few(8)
+        shipped_network(problem.features.shape[1]), problem, balanced(WEIGHTS, problem), few(4)
     )
     assert (fitted.terms["fea"] > 0.0) is (guide is not None)
     positions = surface.vertices[points][problem.loop.order]

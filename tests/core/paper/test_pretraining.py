@@ -103,7 +103,7 @@ def interrupt_in_epoch(number, settings=SETTINGS):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("epoch", [1, 2, 3])
+@pytest.mark.parametrize("epoch", [1, 3])
 def test_interrupted_run_ends_with_the_weights_of_an_uninterrupted_one(
     meshes, finished, tmp_path, epoch
 ):
@@ -222,12 +222,12 @@ def test_sets_are_of_the_kinds_asked_for(
 
 @pytest.mark.slow
 def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
-    settings = replace(SETTINGS, sets=20, epochs=1, open_share=0.4, given_share=0.3)
+    settings = replace(SETTINGS, sets=12, epochs=1, open_share=0.4, given_share=0.3)
     train(meshes, tmp_path / "weights.npz", settings)
     open_curves = sum(not closed for closed, _, _ in prepared)
     given = sum(order == "given" for _, order, _ in prepared)
-    assert 3 <= open_curves <= 13
-    assert 2 <= given <= 11
+    assert 1 <= open_curves <= 9
+    assert 1 <= given <= 8
 
 
 @pytest.mark.slow
