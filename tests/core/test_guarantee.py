@@ -130,7 +130,7 @@ ROUND_THE_HOLE = (ANNULUS, at_vertices(ANNULUS, [67, 34, 29]), True, "given")
 ALONG_THE_RIM = (DISC, at_vertices(DISC, [73, 75, 32]), False, "given")
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(requests(WITHOUT_BOUNDARY))
 def test_variational_without_boundary(request):
     assert_promise_is_kept(*request, "variational")
@@ -142,7 +142,7 @@ def test_elastic_without_boundary(request):
     assert_promise_is_kept(*request, "elastic")
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(requests(WITH_BOUNDARY))
 @example(ROUND_THE_HOLE)
 @example(ALONG_THE_RIM)

@@ -98,7 +98,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     )
     designer = nicmm.Designer(mesh)
     without = 0
-    limits = np.linspace(0.0, max(fractions), 6)
+    limits = np.linspace(0.0, max(fractions), 4)
     for limit in limits:
         after = []
 
