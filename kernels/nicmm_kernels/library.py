@@ -111,6 +111,12 @@ class Kernel:
             raise KernelError(f"{self._name}: {_ERRORS.get(code, f'unknown error {code}')}")
 
 
+@cache
+def has_wide_vectors() -> bool:
+    """Whether the processor has vectors of 256 bits."""
+    return bool(_library().has_wide_vectors())
+
+
 def in_several_calls(
     kernel: Kernel,
     count: int,

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .library import COUNT, POINTER, Kernel, KernelError, address, rows
+from .library import COUNT, POINTER, Kernel, KernelError, address, has_wide_vectors, rows
 
 Matrix = NDArray[np.floating[Any]]
 
@@ -18,7 +17,6 @@ _PRODUCTS = {
     np.dtype(np.float32): Kernel("single_product", *_ARGUMENTS),
     np.dtype(np.float64): Kernel("double_product", *_ARGUMENTS),
 }
-_HAS_WIDE_VECTORS = Kernel("has_wide_vectors")
 
 
 def matrix_product(first: Matrix, second: Matrix, wide: bool = True) -> Matrix:
@@ -44,9 +42,3 @@ def matrix_product(first: Matrix, second: Matrix, wide: bool = True) -> Matrix:
         product.ctypes.data,
     )  # fmt: skip
     return product
-
-
-@cache
-def has_wide_vectors() -> bool:
-    """Whether the processor has vectors of 256 bits."""
-    return bool(_HAS_WIDE_VECTORS.result())
