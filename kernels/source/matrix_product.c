@@ -1,7 +1,6 @@
 /* Products of matrices in single and double precision.
 
-   Every entry is the sum of its terms in their order, so wider vectors give the same bits. The
-   products are as fast as those of a good BLAS; NumPy often has none. */
+   Every entry is the sum of its terms in their order, so wider vectors give the same bits. */
 #include "errors.h"
 
 #include <string.h>

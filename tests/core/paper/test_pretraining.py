@@ -222,12 +222,12 @@ def test_sets_are_of_the_kinds_asked_for(
 
 @pytest.mark.slow
 def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
-    settings = replace(SETTINGS, sets=12, epochs=1, open_share=0.4, given_share=0.3)
+    settings = replace(SETTINGS, sets=20, epochs=1, open_share=0.4, given_share=0.3)
     train(meshes, tmp_path / "weights.npz", settings)
     open_curves = sum(not closed for closed, _, _ in prepared)
     given = sum(order == "given" for _, order, _ in prepared)
-    assert 1 <= open_curves <= 9
-    assert 1 <= given <= 8
+    assert 3 <= open_curves <= 13
+    assert 2 <= given <= 11
 
 
 @pytest.mark.slow
