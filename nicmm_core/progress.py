@@ -135,6 +135,16 @@ def subrange(start: float, end: float) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Neither report progress nor cancel in this block, which must not take long."""
+    token = _watch.set(None)
+    try:
+        yield
+    finally:
+        _watch.reset(token)
+
+
+@contextlib.contextmanager
 def placed(place: Placement) -> Iterator[None]:
     """Map the points that this block reports, (n, 3), to other positions by a function."""
     watch = _watch.get()

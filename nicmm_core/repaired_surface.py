@@ -379,10 +379,11 @@ def _on_component(
         last, component = replace(off_curves, component=part), part
         copies = (*copies, last) if last.differs else copies
         mesh = last.mesh
-    if len(mesh.faces) <= LARGEST_COPY or (mesh.face_component != component).any():
+    is_copied = len(mesh.faces) <= LARGEST_COPY or bool((mesh.face_component != component).any())
+    if is_copied:
         copy = renumbered(mesh, component, exact=last.moved or mapped.moved)
         copies, mesh = (*copies, copy), copy.mesh
-    return Manifold(mapped, copies, SurfaceDesigner(mesh))
+    return Manifold(mapped, copies, SurfaceDesigner(mesh, is_copied))
 
 
 def is_on(manifold: Manifold, start: Resumable) -> bool:

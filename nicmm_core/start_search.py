@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
+from .coarsening.retriangulated import Retriangulated, retriangulated
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import PARTS_APART, is_apart
 from .courses.course_search import FIRST, PART, Search
@@ -27,7 +28,7 @@ from .path.initial_path import find_initial_path, path_curve
 from .path.spline_path import spline_samples
 from .relaxation.close_points import GREATEST_TURN, has_short_legs, turns
 from .relaxation.curve_along import curve_along
-from .relaxation.curve_nodes import CurveSurface, nodes_at
+from .relaxation.curve_nodes import CurveSurface, curve_surface, nodes_at
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
 from .request import Request
@@ -88,19 +89,49 @@ class StartSearch:
     ----------
     mesh : Mesh
         A connected mesh.
+    is_canonical : bool
+        Whether the mesh is a canonical copy. If so, courses are searched for on its Delaunay
+        triangulation.
 
     Attributes
     ----------
-    surface : MappedSurface
-        The surface for relaxation.
     transferred : int
         Number of courses so far that have been transferred from the coarse mesh.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: Mesh, is_canonical: bool = False) -> None:
+        self.mesh, self._is_canonical = mesh, is_canonical
         self.transferred = 0
-        self.surface = MappedSurface(mesh)
+
+    @cached_property
+    def surface(self) -> MappedSurface:
+        """The surface for relaxation.
+
+        Its normals are those of the Delaunay triangulation, so curves on other triangulations bend
+        as much.
+        """
+        if self.on_delaunay is None:
+            return MappedSurface(self.mesh)
+        normals = self.on_delaunay[1].surface.without_maps.vertex_normals
+        return MappedSurface(self.mesh, curve_surface(self.mesh, normals))
+
+    @cached_property
+    def on_delaunay(self) -> tuple[Retriangulated, StartSearch] | None:
+        """The Delaunay triangulation with a search on it; None if this is a search on it."""
+        found = retriangulated(self.mesh) if self._is_canonical else None
+        return None if found is None else (found, StartSearch(found.mesh))
+
+    def from_delaunay(self, request: Request, start: InitialCurve) -> InitialCurve | None:
+        """A start on the Delaunay triangulation as one on the mesh; None if it is not simple there.
+
+        The start has nodes. The request is that on the mesh.
+        """
+        assert self.on_delaunay is not None and isinstance(start.curve, DiscreteCurve)
+        mapped, controls = self.surface.of(request), request.points[start.visited]
+        found = self.on_delaunay[0].curve_back(mapped, start.curve, controls)
+        if found is None:
+            return None
+        return replace(start, curve=found, surface=mapped, unit=self.surface.unit)
 
     def first(
         self, request: Request, courses: Iterator[InitialCurve]
@@ -229,6 +260,12 @@ class StartSearch:
 
     def _joined_courses(self, request: Request, search: Search) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
+        if self.on_delaunay is not None:
+            delaunay, on_delaunay = self.on_delaunay
+            there = delaunay.request_to(request)
+            for start in [] if there is None else on_delaunay.courses(there, search):
+                yield self.from_delaunay(request, start)
+            return
         mapped, unit = self.surface.of(request), self.surface.unit
         if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, search):

@@ -18,6 +18,7 @@ from .courses.course_search import Search
 from .courses.course_set import CourseSet
 from .design_result import Design
 from .errors import CurveError, UnreachableError
+from .final_relaxation import relaxed_on_copy
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.curve_field import curve_field
@@ -73,11 +74,13 @@ class SurfaceDesigner:
     ----------
     mesh : Mesh
         A mesh whose faces all have an area and whose edges have at most two faces.
+    is_canonical : bool
+        Whether it is a canonical copy (`geometry.numbering`).
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, is_canonical: bool = False) -> None:
         self.mesh = mesh
-        self._search = StartSearch(mesh)
+        self._search = StartSearch(mesh, is_canonical)
 
     @property
     def surface(self) -> MappedSurface:
@@ -216,8 +219,32 @@ class SurfaceDesigner:
     def _curves(
         self, request: Request, max_iterations: int | None, rival: Rival | None = None
     ) -> tuple[list[ComparedCurve], bool]:
-        """The best distinct curves by energy, and whether the search was cancelled."""
-        search, before = self._search, self._search.transferred
+        """The best distinct curves by energy, and whether the search was cancelled.
+
+        They are found on the Delaunay triangulation of a canonical copy, and relaxed on the copy.
+        If none of them is simple there, they are found on the copy itself.
+        """
+        if self._search.on_delaunay is not None:
+            delaunay, search = self._search.on_delaunay
+            there = delaunay.request_to(request)
+            if there is not None:
+                with contextlib.suppress(UnreachableError):  # the copy may have another path
+                    found, cancelled = self._found_by(search, there, max_iterations, rival)
+                    relax, most = partial(_relaxed, request), max_iterations
+                    curves = relaxed_on_copy(self._search, request, found, relax, most, cancelled)
+                    if curves:
+                        return curves, any(r.status is Status.CANCELLED for _, r, _ in curves)
+        return self._found_by(self._search, request, max_iterations, rival)
+
+    def _found_by(
+        self,
+        search: StartSearch,
+        request: Request,
+        max_iterations: int | None,
+        rival: Rival | None,
+    ) -> tuple[list[ComparedCurve], bool]:
+        """The best distinct curves on the mesh of a search."""
+        before = search.transferred
         with subrange(0.0, START_FRACTION):
             found: list[CourseSet] = []
             courses = search.courses(request, Search(earlier=found), insist=True)

@@ -7,6 +7,7 @@ Python. While it computes, other threads of Python run.
 """
 
 from .crossings import meeting_segments, polyline_crossings
+from .delaunay_flips import flip_diagonals
 from .distinct_curves import distinct_curves
 from .edge_paths import (
     EdgeGraphArrays,
@@ -93,6 +94,7 @@ __all__ = [
     "edge_lengths",
     "even_places",
     "find_contacts",
+    "flip_diagonals",
     "least_sums",
     "matrix_product",
     "meeting_segments",

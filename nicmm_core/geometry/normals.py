@@ -46,9 +46,16 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
     normals[folded[there]] = unit(area_vector[there].T).T
     if len(mixed):
         normals[mixed] = _normals_on_double_cover(mesh)[mixed]
-    has_mixed = np.isin(mesh.faces, mixed).any(axis=1)
-    faces = (_facing(mesh, normals).sum(axis=1) < 0.0) & ~has_mixed
-    return normals, faces if faces.any() else None
+    return normals, folds(mesh, normals)
+
+
+def folds(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
+    """Whether each face is folded, (F,), given the normals of the vertices; None if no face is."""
+    against = _facing(mesh, normals).sum(axis=1) < 0.0
+    if not against.any():
+        return None
+    faces = against & ~np.isin(mesh.faces, mesh.unoriented_vertices).any(axis=1)
+    return faces if faces.any() else None
 
 
 def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:

@@ -191,7 +191,7 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     inside = np.flatnonzero(mesh.face_component == component)
     used = np.bincount(mesh.faces[inside].ravel(), minlength=len(mesh.vertices)) > 0
     vertex, faces = np.flatnonzero(used), (np.cumsum(used) - 1)[mesh.faces[inside]]
-    frame = principal_frame(mesh.vertices[vertex], faces, mesh.face_areas[inside])
+    frame = frame_of_points(mesh.vertices[vertex])
     checkpoint()
     places = frame.coordinates(mesh.vertices[vertex])
     places, integers = _rounded_soundly(places, faces, exact)
@@ -278,10 +278,32 @@ def principal_frame(
     at_corners = sum(np.take(squared, corner, axis=0) for corner in faces.T)
     skewness = share @ (total * (total * total + 3.0 * at_corners)) / 60.0
     skewness += 0.1 * (at_vertices @ (squared * along))
+    return PrincipalFrame(centre, _pointing(axes, skewness), max(float(np.sqrt(area)), TINY))
+
+
+def frame_of_points(positions: FloatArray) -> PrincipalFrame:
+    """The principal frame of points, (n, 3), all with the same weight.
+
+    The unit is such that it is the square root of the area for points spread evenly over a sphere.
+    """
+    centre = positions.mean(axis=0)
+    offset = positions - centre
+    squares, eigenvectors = np.linalg.eigh(offset.T @ offset / len(positions))
+    axes, deviation = _settled(squares, eigenvectors), float(np.sqrt(squares.sum()))
+    skewness = ((offset @ axes / max(deviation, TINY)) ** 3).mean(axis=0)
+    return PrincipalFrame(
+        centre, _pointing(axes, skewness), max(float(np.sqrt(4.0 * np.pi)) * deviation, TINY)
+    )
+
+
+def _pointing(axes: FloatArray, skewness: FloatArray) -> FloatArray:
+    """Axes, one in each column, each in the direction in which the skewness is positive.
+
+    Without skewness, the largest component is positive.
+    """
     largest = axes[np.abs(axes).round(6).argmax(axis=0), np.arange(3)]
     signs = np.where(np.abs(skewness) > SYMMETRIC, skewness, largest)
-    axes *= np.where(signs < 0.0, -1.0, 1.0)
-    return PrincipalFrame(centre, axes, max(float(np.sqrt(area)), TINY))
+    return axes * np.where(signs < 0.0, -1.0, 1.0)
 
 
 def _settled(squares: FloatArray, axes: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh
-from ..geometry.normals import normals_and_folds
+from ..geometry.normals import folds, normals_and_folds
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import feature_map
 
@@ -67,8 +67,13 @@ class CurveSurface:
         )
 
 
-def curve_surface(mesh: Mesh) -> CurveSurface:
-    """Prepare a mesh as the surface of curves, without a feature map."""
+def curve_surface(mesh: Mesh, vertex_normals: FloatArray | None = None) -> CurveSurface:
+    """Prepare a mesh as the surface of curves, without a feature map.
+
+    Normals at its vertices, (V, 3), may be given.
+    """
+    if vertex_normals is not None:
+        return CurveSurface(mesh, vertex_normals, folded=folds(mesh, vertex_normals))
     normals, folded = normals_and_folds(mesh)
     return CurveSurface(mesh, normals, folded=folded)
 

@@ -255,9 +255,27 @@ def _relaxed(
         curve = first
         result = first.surface_curve(task.surface.mesh) if start is None else start
         status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
-    bending = bending_energy(curve.nodes, task.surface.normal_bending)
-    feature = feature_energy(curve.nodes)
-    return Relaxed(result, curve, bending, feature, task.iterations, status, task.work, collided)
+    return replace(
+        unrelaxed(task.surface, curve, status),
+        curve=result,
+        iterations=task.iterations,
+        work=task.work,
+        collided=collided,
+    )
+
+
+def unrelaxed(surface: CurveSurface, curve: DiscreteCurve, status: Status) -> Relaxed:
+    """A simple curve as the result of no iterations."""
+    bending = bending_energy(curve.nodes, surface.normal_bending)
+    return Relaxed(
+        curve.surface_curve(surface.mesh),
+        curve,
+        bending,
+        feature_energy(curve.nodes),
+        0,
+        status,
+        0.0,
+    )
 
 
 def _attempt(

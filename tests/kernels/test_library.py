@@ -457,6 +457,19 @@ def arguments_distinct(c=4):
     return {"positions": positions, "order": np.arange(c), "limit": 0.1, "meanwhile": nothing}
 
 
+def arguments_flips(n=40):
+    """Arguments of `flip_diagonals` for n faces, by name."""
+    return {
+        "vertices": BALL.vertices.copy(),
+        "faces": BALL.faces[:n].copy(),
+        "opposites": opposite_sides(BALL.faces[:n]),
+        "ranks": np.arange(len(BALL.vertices)),
+        "flattest": 0.5,
+        "tie": 0.01,
+        "meanwhile": nothing,
+    }
+
+
 def arguments_nearest(n=4):
     """Arguments of `nearest_places` for n positions and two groups, by name."""
     faces = np.arange(9)
@@ -479,6 +492,7 @@ def arguments_sums():
 CALLS = {
     "least_sums": (nicmm_kernels.least_sums, arguments_sums),
     "distinct_curves": (nicmm_kernels.distinct_curves, arguments_distinct),
+    "flip_diagonals": (nicmm_kernels.flip_diagonals, arguments_flips),
     "nearest_places": (nicmm_kernels.nearest_places, arguments_nearest),
     "turning_paths": (nicmm_kernels.turning_paths, arguments_turning),
     "best_legs": (nicmm_kernels.best_legs, arguments_legs),
@@ -544,6 +558,7 @@ INDICES = {
     "turning_paths": [("onward", 1), ("leaving", 1), ("arriving", 1)],
     "best_legs": [("graph", 2), ("graph", 3)],
     "distinct_curves": [("order", None)],
+    "flip_diagonals": [("faces", None), ("opposites", None)],
     "nearest_places": [("groups", None), ("faces", None)],
     "distinct_routes": [("via", None)],
 }
@@ -582,6 +597,7 @@ RESUMED = [
     "distances_from_segments",
     "distinct_curves",
     "distances_along_edges",
+    "flip_diagonals",
     "meeting_segments",
     "nearest_places",
     "paths_along_edges",
