@@ -201,7 +201,7 @@ def _samples(points: FloatArray, closed: bool) -> FloatArray:
 def _energy(design: nicmm.Design, scale: float | None) -> tuple[float, float]:
     """Energy of a curve on a length scale, by default its length, and that scale.
 
-    Lengths are those of the copy on which the curve was designed, whose area is 1.
+    Lengths are those of the copy on which the curve was designed.
     """
     assert design.resumable is not None
     nodes, mesh = design.resumable.curve.nodes, design.resumable.mesh

@@ -10,9 +10,11 @@ or, if no course is found,
 
 control points → initial path (`path`) → relaxation of the path.
 
-Except on small meshes, courses are found on a coarse mesh of the same surface, and mapped from
-there to the fine mesh (`coarsening`). The other methods are in `paper`. The functions besides
-`design_curve` make control points, or further curves, and use the same `Designer`.
+All of this takes place on the Delaunay triangulation of the surface, and a last relaxation on the
+given faces (`final_relaxation`). Except on small meshes, courses are found on a coarse mesh of the
+same surface, and mapped from there to the fine mesh (`coarsening`). The other methods are in
+`paper`. The functions besides `design_curve` make control points, or further curves, and use the
+same `Designer`.
 """
 
 from __future__ import annotations

@@ -20,10 +20,17 @@ class MappedSurface:
         A connected mesh.
     surface : CurveSurface, optional
         Its surface, by default with the vertex normals of the mesh.
+    same_vertices : MappedSurface, optional
+        The surface of another mesh with the same vertices, from which φ_fea is taken.
     """
 
-    def __init__(self, mesh: Mesh, surface: CurveSurface | None = None) -> None:
-        self.mesh, self._given = mesh, surface
+    def __init__(
+        self,
+        mesh: Mesh,
+        surface: CurveSurface | None = None,
+        same_vertices: MappedSurface | None = None,
+    ) -> None:
+        self.mesh, self._given, self._other = mesh, surface, same_vertices
         self._latest: tuple[Request, CurveSurface] | None = None
 
     @cached_property
@@ -44,9 +51,19 @@ class MappedSurface:
         surface = self.without_maps
         if request.has_maps:
             if self._latest is None or not same_maps(self._latest[0], request):
-                maps = request.obstacles, request.alignment
-                self._latest = request, with_maps(surface, *maps, self.unit)
+                self._latest = request, self._with_maps(request)
             surface = self._latest[1]
         if not request.normal_bending:
             return surface
         return replace(surface, normal_bending=request.normal_bending)
+
+    def _with_maps(self, request: Request) -> CurveSurface:
+        if self._other is None:
+            maps = request.obstacles, request.alignment
+            return with_maps(self.without_maps, *maps, self.unit)
+        there = self._other.of(request)
+        return replace(
+            self.without_maps,
+            feature_map=there.feature_map,
+            feature_weight=there.feature_weight,
+        )

@@ -381,7 +381,7 @@ def _on_component(
         mesh = last.mesh
     is_copied = len(mesh.faces) <= LARGEST_COPY or bool((mesh.face_component != component).any())
     if is_copied:
-        copy = renumbered(mesh, component, exact=last.moved or mapped.moved)
+        copy = renumbered(mesh, component, apart=last.moved or mapped.moved)
         copies, mesh = (*copies, copy), copy.mesh
     return Manifold(mapped, copies, SurfaceDesigner(mesh, is_copied))
 

@@ -107,13 +107,14 @@ class StartSearch:
     def surface(self) -> MappedSurface:
         """The surface for relaxation.
 
-        Its normals are those of the Delaunay triangulation, so curves on other triangulations bend
-        as much.
+        Its normals and φ_fea are those of the Delaunay triangulation, so curves on other
+        triangulations have the same energy.
         """
         if self.on_delaunay is None:
             return MappedSurface(self.mesh)
-        normals = self.on_delaunay[1].surface.without_maps.vertex_normals
-        return MappedSurface(self.mesh, curve_surface(self.mesh, normals))
+        on_delaunay = self.on_delaunay[1].surface
+        normals = on_delaunay.without_maps.vertex_normals
+        return MappedSurface(self.mesh, curve_surface(self.mesh, normals), on_delaunay)
 
     @cached_property
     def on_delaunay(self) -> tuple[Retriangulated, StartSearch] | None:

@@ -2,12 +2,13 @@
 
 Which of several paths of about the same length is found depends on the order in which vertices and
 faces are visited, and on the last bit of their coordinates. In the copy, vertices and faces are
-sorted by position in the principal frame of the component, its area is 1, and coordinates are
-rounded. Each axis of this frame points to where the surface reaches farther, even if the frame is
-then left-handed. Faces are oriented so that the surface encloses a positive volume with its
-centroid. So a mesh that is renumbered, rotated, translated, scaled, mirrored or turned over has
-exactly the same copy, unless a coordinate is within a rounding error of the middle between two
-multiples of the resolution. Surfaces without a unique principal frame, such as a sphere, are an
+sorted by position in the principal frame of the vertices of the component, in whose unit its area
+is about 1, and coordinates are rounded. Each axis of this frame points to where the vertices reach
+farther, even if the frame is then left-handed. Faces are oriented so that the surface encloses a
+positive volume with its centre. So a mesh that is renumbered, rotated, translated, scaled, mirrored
+or turned over has exactly the same copy, and one with other faces between the same vertices has the
+same vertices, unless a coordinate is within a rounding error of the middle between two multiples of
+the resolution. Vertices without a unique principal frame, such as those of a sphere, are an
 exception. Other components of the mesh make no difference.
 """
 
@@ -22,16 +23,20 @@ import numpy as np
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .curve import SurfaceCurve, points_of, with_points
+from .grouping import distinct_rows
 from .mesh import Mesh, area_vectors
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
 RESOLUTIONS = (1e-5, 3e-6, 1e-6, 1e-7, 1e-9)
-"""Units to which coordinates are rounded, in square roots of the area.
+"""Units to which coordinates are rounded, in units of the frame.
 
 The coarser they are, the fewer coordinates of a mesh far away, or with gaps, are rounded to another
 value. Finer ones are for meshes with tiny or thin faces.
 """
+
+FINE = RESOLUTIONS[3:]
+"""Those for meshes whose vertices have been moved apart by a thousandth of an edge."""
 
 SOUND = 0.05
 """Greatest change of the area vector of a face by rounding, relative to the area of the face.
@@ -49,9 +54,9 @@ If they are closer, both axes depend on rounding errors and not only on the surf
 """
 
 VOLUME = 1e-6
-"""Volume up to which it does not determine the orientation, as of a plane; the area is 1.
+"""Volume up to which it does not determine the orientation, as of a plane; the area is about 1.
 
-The volume is that between the surface and its centroid."""
+The volume is that between the surface and its centre."""
 
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface counts as symmetric in that direction."""
@@ -59,17 +64,17 @@ SYMMETRIC = 1e-6
 
 @dataclass(frozen=True)
 class PrincipalFrame:
-    """The surface's centroid and principal axes.
+    """The centroid and the principal axes of a surface, or of points.
 
     Attributes
     ----------
     centre : (3,) float array
-        Centroid of the surface.
+        Centroid.
     axes : (3, 3) float array
         Unit vectors along the axes, one in each column, each pointing to where the surface reaches
         farther. If the surface is symmetric along an axis, its largest component is positive.
     unit : float
-        Square root of the area of the surface.
+        Square root of the area of the surface; for points, that of the sphere of the same variance.
     """
 
     centre: FloatArray
@@ -99,7 +104,7 @@ class Renumbered:
     original : Mesh
         The given mesh.
     mesh : Mesh
-        The copy; its area is 1.
+        The copy.
     vertex : (V',) int array
         Original vertex of each vertex of the copy.
     face : (F',) int array
@@ -178,15 +183,15 @@ class Renumbered:
         return SurfacePoints(faces, weights)
 
 
-def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbered:
+def renumbered(mesh: Mesh, component: int = 0, apart: bool = False) -> Renumbered:
     """Make the canonical copy of a component of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
     component : int
-    exact : bool
-        Whether coordinates are not rounded, as for copies of a vertex that must stay apart.
+    apart : bool
+        Whether vertices have been moved by so little that coarse rounding would undo it.
     """
     inside = np.flatnonzero(mesh.face_component == component)
     used = np.bincount(mesh.faces[inside].ravel(), minlength=len(mesh.vertices)) > 0
@@ -194,7 +199,7 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     frame = frame_of_points(mesh.vertices[vertex])
     checkpoint()
     places = frame.coordinates(mesh.vertices[vertex])
-    places, integers = _rounded_soundly(places, faces, exact)
+    places, integers = _rounded_soundly(places, faces, apart)
     order = np.lexsort(integers.T[::-1])
     checkpoint()
     faces = np.argsort(order)[faces]
@@ -216,7 +221,7 @@ def _turned(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> BoolArray:
     mesh : Mesh
         The given mesh, whose orientable components are consistently oriented.
     vertices, faces : (V', 3) float array, (F', 3) int array
-        The copy in the orientation of the given mesh. The area is 1, and each face begins at its
+        The copy in the orientation of the given mesh. The area is about 1. Each face begins at its
         vertex of lowest index.
     """
     rising = faces[:, 1] < faces[:, 2]
@@ -233,19 +238,22 @@ def _turned(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> BoolArray:
 
 
 def _rounded_soundly(
-    places: FloatArray, faces: IntArray, exact: bool
+    places: FloatArray, faces: IntArray, apart: bool
 ) -> tuple[FloatArray, IntArray]:
     """Coordinates, (n, 3), rounded as coarsely as the faces allow; the same as integers.
 
-    They are not rounded if the faces allow no resolution, or if `exact` is set.
+    They are not rounded if the faces allow no resolution. If vertices have been moved apart, only
+    the finest resolutions that keep them apart are allowed.
     """
     before = area_vectors(places, faces)
     greatest = SOUND * np.linalg.norm(before, axis=1)
-    for resolution in RESOLUTIONS:
+    for resolution in FINE if apart else RESOLUTIONS:
         integers = rounded_to_integers(places / resolution)
         rounded = resolution * integers
         change = area_vectors(rounded, faces) - before
-        if not exact and (np.linalg.norm(change, axis=1) <= greatest).all():
+        if (np.linalg.norm(change, axis=1) > greatest).any():
+            continue
+        if not apart or len(distinct_rows(rounded)[0]) == len(distinct_rows(places)[0]):
             return rounded, integers
     return places, integers
 
@@ -282,10 +290,7 @@ def principal_frame(
 
 
 def frame_of_points(positions: FloatArray) -> PrincipalFrame:
-    """The principal frame of points, (n, 3), all with the same weight.
-
-    The unit is such that it is the square root of the area for points spread evenly over a sphere.
-    """
+    """Compute the principal frame of points, (n, 3), all with the same weight."""
     centre = positions.mean(axis=0)
     offset = positions - centre
     squares, eigenvectors = np.linalg.eigh(offset.T @ offset / len(positions))

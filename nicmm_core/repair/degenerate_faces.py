@@ -147,6 +147,29 @@ def _without_caps(
     return divided.taken(left), divisions
 
 
+def moved_apart(
+    vertices: FloatArray, faces: IntArray, short: float, moving: BoolArray
+) -> FloatArray:
+    """Move some vertices towards the faces around them, by a thousandth of their shortest edge.
+
+    So vertices at the same position come apart, wherever the mesh is and however it is numbered.
+    For the arguments see `perturbed`.
+    """
+    if not moving.any():
+        return vertices
+    around = np.flatnonzero(moving[faces].any(axis=1))
+    corners = faces[around]
+    centres = vertices[corners].mean(axis=1)
+    total, count = np.zeros_like(vertices), np.bincount(corners.ravel(), minlength=len(vertices))
+    np.add.at(total, corners, centres[:, None])
+    inward = total[moving] / np.maximum(count[moving], 1)[:, None] - vertices[moving]
+    length = np.linalg.norm(inward, axis=1, keepdims=True)
+    reach = tolerances.PERTURBATION * _shortest_edges(vertices, faces, short)[moving, None]
+    result = vertices.copy()
+    result[moving] += reach * inward / np.maximum(length, tolerances.TINY)
+    return result
+
+
 def perturbed(
     vertices: FloatArray,
     faces: IntArray,

@@ -6,9 +6,9 @@
 - If that separates control points, such an edge is divided into pieces, on which different pairs of
   its faces are joined, so that all of its faces are connected.
 - Faces are turned over so that every orientable part is consistently oriented.
-- Vertices of faces without area that remain are moved in random directions by about a thousandth of
-  their shortest edge of non-zero length, so that every face has an area. Copies of a vertex are
-  moved apart in the same way.
+- Vertices at the same position, such as copies of a vertex, are moved apart, each towards the faces
+  around it, by a thousandth of its shortest edge of non-zero length. Vertices of faces without area
+  that remain are moved in random directions by about as much, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry import tolerances
-from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import components, grouped
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.grouping import components, distinct_rows, grouped
 from ..geometry.mesh import Mesh, joined_corners, side_corners, side_keys
 from ..geometry.orientation import turned_faces
 from ..progress import checkpoint
 from .clean_surface import CleanSurface
-from .degenerate_faces import degenerate_faces, perturbed
+from .degenerate_faces import degenerate_faces, moved_apart, perturbed
 from .edge_subdivision import subdivided
 from .face_parts import FaceParts
 from .mapped_mesh import MappedMesh
@@ -31,6 +31,9 @@ from .straight_edges import straightened
 SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
 one pair of faces, so no two edges of the result have the same ends."""
+
+SUM_OF_COORDINATES = np.array([1.0, 0.7320508, 0.4142136])
+"""Weights of the coordinates in a sum that hardly any two positions have in common."""
 
 MOST_COMPARED = 32
 """Number of faces at an edge up to which all pairs of them are compared."""
@@ -71,13 +74,15 @@ def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMe
         return None
     short = tolerances.SAME_POSITION * clean.original.diagonal
     flat = degenerate_faces(vertices, parts.faces, short)
-    copies = place != np.arange(len(place))
-    origin, moved = np.zeros(3), bool(flat.any() or copies.any())
+    shared = at_shared_positions(vertices, parts.faces)
+    origin, moved = np.zeros(3), bool(flat.any() or shared.any())
     if moved:
-        # Far from the origin, rounding would remove small moves. Copies of a vertex are moved, too:
-        # otherwise a straight trace from one of them would pass exactly through another.
+        # Far from the origin, rounding would remove small moves. Vertices at the same position are
+        # moved, too: a straight trace from one of them would pass exactly through another.
         origin = vertices[parts.faces[0, 0]]
-        vertices = perturbed(vertices - origin, parts.faces, short, flat, copies)
+        vertices = moved_apart(vertices - origin, parts.faces, short, shared)
+        still = at_shared_positions(vertices, parts.faces)
+        vertices = perturbed(vertices, parts.faces, short, flat, still)
     if moved or not np.array_equal(parts.faces, mesh.faces):
         mesh = Mesh(vertices, parts.faces)
     turned = turned_faces(mesh)
@@ -101,6 +106,23 @@ def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMe
         moved=moved,
         repairs=repairs,
     )
+
+
+def at_shared_positions(vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Whether each vertex of the faces is at the position of another one of them, (V,)."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    used = np.flatnonzero(used)
+    # Numbers sort faster than rows. Equal positions have equal sums.
+    sums = vertices[used] @ SUM_OF_COORDINATES
+    order = np.argsort(sums, kind="stable")
+    same = sums[order[1:]] == sums[order[:-1]]
+    alike = used[order[np.append(same, False) | np.append(False, same)]]
+    shared = np.zeros(len(vertices), dtype=bool)
+    if len(alike):
+        _, group = distinct_rows(vertices[alike])
+        shared[alike] = np.bincount(group)[group] > 1
+    return shared
 
 
 def is_manifold(mesh: Mesh) -> bool:

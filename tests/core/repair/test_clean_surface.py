@@ -24,6 +24,16 @@ SHAPES = {
     "Möbius strip": shapes.moebius_strip(),
 }
 
+PINCHED = SHAPES["egg"].vertices.copy()
+PINCHED[[5, 40]] = 0.5 * (PINCHED[5] + PINCHED[40])
+
+WITH_SHARED_POSITIONS = {
+    "two vertices at one position": nicmm.Mesh(PINCHED, SHAPES["egg"].faces),
+    "one vertex with two fans": nicmm.Mesh(
+        PINCHED, np.where(SHAPES["egg"].faces == 40, 5, SHAPES["egg"].faces)
+    ),
+}
+
 DEFECTIVE = dict(defective_meshes())
 
 EXACT = [*same_surface.SAME_CURVE, "faces without area", "T-junctions"]
@@ -37,7 +47,7 @@ def repaired(mesh):
 def canonical(mesh):
     """The canonical copy of the repaired mesh's first component."""
     mapped = repaired(mesh)
-    return renumbered(mapped.mesh, int(mapped.mesh.face_component[0]), exact=mapped.moved).mesh
+    return renumbered(mapped.mesh, int(mapped.mesh.face_component[0]), apart=mapped.moved).mesh
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -47,6 +57,17 @@ def test_a_changed_mesh_has_the_same_copy(shape, name):
     one, other = canonical(mesh), canonical(same_surface.changed(mesh, name, 5).mesh)
     np.testing.assert_array_equal(other.vertices, one.vertices)
     np.testing.assert_array_equal(other.faces, one.faces)
+
+
+@pytest.mark.parametrize("shape", WITH_SHARED_POSITIONS)
+@pytest.mark.parametrize("name", same_surface.SAME_CURVE)
+def test_a_surface_that_touches_itself_has_the_same_copy(shape, name):
+    """Whether its vertices there are one, two, or as many as faces."""
+    mesh = WITH_SHARED_POSITIONS[shape]
+    one, other = canonical(mesh), canonical(same_surface.changed(mesh, name, 5).mesh)
+    np.testing.assert_array_equal(other.vertices, one.vertices)
+    np.testing.assert_array_equal(other.faces, one.faces)
+    assert len(np.unique(one.vertices, axis=0)) == len(SHAPES["egg"].vertices)
 
 
 @pytest.mark.slow
