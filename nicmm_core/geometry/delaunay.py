@@ -52,4 +52,6 @@ def sorted_faces(faces: IntArray) -> IntArray:
     """Faces, (F, 3), each from its vertex of least index, in ascending order."""
     first = (np.arange(3) + faces.argmin(axis=1)[:, None]) % 3
     faces = np.take_along_axis(faces, first, axis=1)
-    return np.ascontiguousarray(faces[np.lexsort(faces.T[::-1])], np.int64)
+    low, middle, high = faces.T
+    order = np.lexsort((high, low * (int(faces.max(initial=0)) + 1) + middle))
+    return np.ascontiguousarray(faces[order], np.int64)

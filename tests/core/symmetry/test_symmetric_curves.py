@@ -267,7 +267,7 @@ class TestOptions:
 
         Without it, the curve stays on the outer side.
         """
-        points = nearest_vertices(ring, on_torus([-60.0, 60.0], [0.0, 0.0]))
+        points = nearest_vertices(ring, on_torus([-60.0, 60.0], [30.0, 30.0]))
         over = nearest_vertices(ring, on_torus([-30.0, 0.0, 30.0], [150.0, 180.0, 150.0]))
         design = nicmm.design_curve(ring, points, closed=False, mirror=MIRROR, via_points={0: over})
         (curve,) = design.curves
