@@ -114,12 +114,14 @@ def section(results: Results) -> str:
         f"{results['seed']}), asked for as a closed and as an open curve.\n\n"
         + report.table(header, rows)
         + "\n\nThe first nine changes keep the faces up to order, orientation, repetition and "
-        "vertices in common, so the curve is the same unless a coordinate is rounded otherwise, or "
-        "parts of the surface touch at vertices, which a soup cannot tell apart. The others change "
-        "the triangulation. Divided edges become whole again, except beside needles. Other "
-        "diagonals, and gaps as wide as a rounding error in single precision, change the search "
-        "graph, and the search may find another course. Times are processor times of single runs, "
-        "two at once. The paper has no corresponding measurement."
+        "vertices in common, so the curve is the same unless a coordinate is rounded "
+        "otherwise. The others change the triangulation. Divided edges become whole again, "
+        "except beside needles. Gaps as wide as a rounding error in single precision move "
+        "vertices, which are then rounded otherwise, and the search may find another course. "
+        "Other diagonals mostly lead to the same Delaunay triangulation, on which the curve "
+        "is found, but the surface on which it is relaxed at last is another one. Times are "
+        "processor times of single runs, two at once. The paper has no corresponding "
+        "measurement."
     )
 
 

@@ -130,33 +130,34 @@ static int is_better(const FlippedMesh *mesh, const Quadrilateral *quad, const F
     return least % 2 == 0;
 }
 
-/* Whether a vertex of the face of a side may get an edge to another vertex: all of its faces are
+/* Whether the corner opposite a side may get an edge to another vertex: all faces at the corner are
    connected by edges, and none has the other vertex. `work` is raised by the number of faces. */
 static int may_join(const FlippedMesh *mesh, int64_t side, int64_t other, int64_t *work, int *may)
 {
-    int64_t vertex = mesh->faces[side], faces = 1;
+    int64_t vertex = mesh->faces[side], count = 1;
     CHECK(vertex, mesh->vertex_count);
     *may = 0;
-    for (int direction = 1; direction <= 2; direction++) {
-        int64_t at = next_in_face(side, direction);
-        for (;;) {
-            int64_t across = mesh->opposites[at], corner = -1;
+    /* In one direction around the vertex and, if that ends at a boundary, in the other one. */
+    for (int direction = 1, is_around = 0; direction <= 2 && !is_around; direction++) {
+        int64_t at = next_in_face(side, direction), across = mesh->opposites[at];
+        while (across != at && !is_around) {
+            int64_t corner = -1;
             CHECK(across, 3 * mesh->face_count);
-            if (across == at) break;
-            if (across / 3 == side / 3) goto around;
-            for (int64_t step = 0; step < 3; step++) {
+            is_around = across / 3 == side / 3;
+            for (int64_t step = 0; step < 3 && !is_around; step++) {
                 int64_t here = next_in_face(across, step);
                 if (mesh->faces[here] == other) return OK;
                 if (mesh->faces[here] == vertex) corner = here;
             }
-            if (corner < 0 || corner == across || ++faces > mesh->valences[vertex]) return OK;
-            at = next_in_face(corner, 1) == across ? next_in_face(corner, 2)
-                                                   : next_in_face(corner, 1);
+            if (is_around) break;
+            if (corner < 0 || corner == across || ++count > mesh->valences[vertex]) return OK;
+            int64_t next = next_in_face(corner, 1);
+            at = next == across ? next_in_face(corner, 2) : next;
+            across = mesh->opposites[at];
             ++*work;
         }
     }
-around:
-    *may = faces == mesh->valences[vertex];
+    *may = count == mesh->valences[vertex];
     return OK;
 }
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
@@ -85,12 +86,13 @@ class Retriangulated:
         SurfacePoints
             The m places.
         """
-        mesh = self.original
-        at_vertices = mesh.vertex_faces.astype(np.int32)  # sums of bytes might overflow to zero
-        of_faces = self.mesh.vertex_faces.astype(np.int32).T.tocsr()[nodes.places.faces]
-        around = of_faces @ at_vertices @ at_vertices.T @ at_vertices
-        node = np.arange(len(nodes.positions)).repeat(np.diff(around.indptr))
-        face = around.indices.astype(np.int64)
+        mesh, n = self.original, len(nodes.positions)
+        every, corners = np.arange(n), self.mesh.faces[nodes.places.faces]
+        entries = (np.ones(3 * n), (every.repeat(3), corners.ravel()))
+        near = sparse.csr_array(entries, shape=(n, len(mesh.vertices)))
+        at_vertices = mesh.vertex_faces.astype(np.float64)  # sums of bytes might overflow to zero
+        around = near @ at_vertices @ at_vertices.T @ at_vertices
+        node, face = every.repeat(np.diff(around.indptr)), around.indices.astype(np.int64)
         barycentric, along = _meeting(
             mesh.vertices[mesh.faces[face]], nodes.positions[node], nodes.normals[node]
         )
