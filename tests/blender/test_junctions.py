@@ -104,7 +104,7 @@ def cross(empty_scene, first):
     The point is not right beside a vertex, where a third curve from there cannot always follow.
     """
     ends = on(first, ring([110.0, 150.0], [0.5, -0.5]))
-    places = [ends[0], place_on(empty_scene, "First", share=0.3), ends[1]]
+    places = [ends[0], place_on(empty_scene, "First", share=0.27), ends[1]]
     draw(first, places, "Second", closed=False, avoid_others=True, clearance=CLEARANCE)
     return first
 
