@@ -21,6 +21,12 @@ from .symmetry.symmetric_relaxation import ComparedCurve
 FAR_MORE, SLIGHTLY = 1.2, 3.0
 """Factor and increase of L ∮ κ_g² ds, together, above which a curve bends far more than before."""
 
+LEAST_DECREASE = 1e-4
+"""Decrease of the energy in an iteration, relative to the bending energy, below which it converges.
+
+It is less than where curves are only compared, since the result must have no ripples.
+"""
+
 Relax = Callable[[InitialCurve, RelaxationConfig, int | None], Relaxed]
 """Relaxes a start with some settings and at most a number of iterations."""
 
@@ -85,7 +91,12 @@ def _relaxed_on_levels(
     """
     assert isinstance(start.curve, DiscreteCurve)
     enough = FAR_MORE * scaled_bending(before.discrete_curve) + SLIGHTLY
-    config = replace(relaxation_config(request), tension_factor=1.0, fine_below=0.0)
+    config = replace(
+        relaxation_config(request),
+        least_decrease=LEAST_DECREASE,
+        tension_factor=1.0,
+        fine_below=0.0,
+    )
     found, last = [unrelaxed(start.surface, start.curve, before.status)], config.levels[-1]
     for levels in (last,), (last // 2, last), config.levels:
         found.append(relax(start, replace(config, levels=levels), max_iterations))

@@ -1,6 +1,8 @@
 """Designs a curve on a manifold: from an earlier curve, from a course, or from the initial path.
 
-This is the pipeline of a checked request; `design` is its entry point.
+This is the pipeline of a checked request; `design` is its entry point. The manifold is the last
+copy of the given mesh. A new curve is found on the Delaunay triangulation of that copy
+(`coarsening.retriangulated`), and relaxed on the copy at last (`final_relaxation`).
 """
 
 from __future__ import annotations

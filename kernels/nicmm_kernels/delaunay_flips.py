@@ -20,7 +20,6 @@ class _FlippedMesh(ctypes.Structure):
         ("vertex_count", COUNT),
         ("face_count", COUNT),
         ("vertices", POINTER),
-        ("ranks", POINTER),
         ("valences", POINTER),
         ("faces", POINTER),
         ("opposites", POINTER),
@@ -41,14 +40,14 @@ def flip_diagonals(
     vertices: FloatArray,
     faces: IntArray,
     opposites: IntArray,
-    ranks: IntArray,
     flattest: float,
     tie: float,
     meanwhile: Callable[[], object],
 ) -> IntArray:
     """Flip edges until each is the better diagonal of its two faces.
 
-    That is the one with the smaller sum of opposite angles.
+    That is the one with the smaller sum of opposite angles. If both sums are about equal, it is the
+    one at the vertex of least index.
 
     Parameters
     ----------
@@ -58,8 +57,6 @@ def flip_diagonals(
     opposites : (3 F,) int array
         For each side, the same edge as a side of the next face, or the side itself. Side 3 f + j is
         opposite corner j of face f.
-    ranks : (V,) int array
-        If both sums are about equal, the diagonal at the vertex of least rank is better.
     flattest : float
         Least cosine between any two normals of the faces on both diagonals. Other edges stay.
     tie : float
@@ -79,8 +76,8 @@ def flip_diagonals(
     flipped, beyond = faces.copy(), opposites.copy()
     valences = np.bincount(faces.ravel(), minlength=v).astype(np.int64)
     mesh = _FlippedMesh(
-        v, f, address("vertices", vertices, FLOAT, v, 3), address("ranks", ranks, INT, v),
-        valences.ctypes.data, flipped.ctypes.data, beyond.ctypes.data,
+        v, f, address("vertices", vertices, FLOAT, v, 3), valences.ctypes.data,
+        flipped.ctypes.data, beyond.ctypes.data,
     )  # fmt: skip
     rules, scratch = _FlipRules(flattest, tie), np.empty(_ITEMS.result(f))
     ring = np.array([0, 3 * f, 0], dtype=np.int64)

@@ -7,7 +7,6 @@
 typedef struct {
     int64_t vertex_count, face_count;
     const double *vertices; /* (V, 3) positions */
-    const int64_t *ranks;   /* (V) on which diagonals depend where both are equally good */
     int64_t *valences;      /* (V) number of faces at each vertex */
     int64_t *faces;         /* (F, 3) */
     int64_t *opposites;     /* (3 F) same edge as a side of the next face, or the side itself */
@@ -114,8 +113,8 @@ static double angle_at(const double *const corners[4], int corner)
 }
 
 /* Whether the other diagonal, from corner 0 to corner 2, is better by the sums of the angles
-   opposite both, or by ranks if the sums are about equal. The angles are those of the quadrilateral
-   in space, so the answer does not depend on the present diagonal. */
+   opposite both or, if the sums are about equal, by the vertex of least index. The angles are those
+   of the quadrilateral in space, so the answer does not depend on the present diagonal. */
 static int is_better(const FlippedMesh *mesh, const Quadrilateral *quad, const FlipRules *rules)
 {
     const double *corners[4];
@@ -124,9 +123,9 @@ static int is_better(const FlippedMesh *mesh, const Quadrilateral *quad, const F
     double excess = angle_at(corners, 0) + angle_at(corners, 2) - angle_at(corners, 1) -
                     angle_at(corners, 3);
     if (!(fabs(excess) <= rules->tie)) return excess > 0.0;
-    int64_t least = 0;
+    int least = 0;
     for (int j = 1; j < 4; j++)
-        if (mesh->ranks[quad->corners[j]] < mesh->ranks[quad->corners[least]]) least = j;
+        if (quad->corners[j] < quad->corners[least]) least = j;
     return least % 2 == 0;
 }
 

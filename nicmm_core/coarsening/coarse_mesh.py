@@ -77,8 +77,7 @@ class CoarseMesh:
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
         cells, group = np.unique(self.cell[corner], return_inverse=True)
-        at_cells = self.mesh.vertex_faces.astype(np.int32)  # sums of bytes might overflow to zero
-        around = at_cells[cells] @ at_cells.T @ at_cells
+        around = self.mesh.faces_near(cells[:, None])
         return _nearest_in_groups(self.mesh, points.positions(fine), group, around)
 
     def nearest_fine_points(

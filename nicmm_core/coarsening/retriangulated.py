@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
@@ -86,13 +85,10 @@ class Retriangulated:
         SurfacePoints
             The m places.
         """
-        mesh, n = self.original, len(nodes.positions)
-        every, corners = np.arange(n), self.mesh.faces[nodes.places.faces]
-        entries = (np.ones(3 * n), (every.repeat(3), corners.ravel()))
-        near = sparse.csr_array(entries, shape=(n, len(mesh.vertices)))
-        at_vertices = mesh.vertex_faces.astype(np.float64)  # sums of bytes might overflow to zero
-        around = near @ at_vertices @ at_vertices.T @ at_vertices
-        node, face = every.repeat(np.diff(around.indptr)), around.indices.astype(np.int64)
+        mesh = self.original
+        around = mesh.faces_near(self.mesh.faces[nodes.places.faces])
+        node = np.arange(len(nodes.positions)).repeat(np.diff(around.indptr))
+        face = around.indices.astype(np.int64)
         barycentric, along = _meeting(
             mesh.vertices[mesh.faces[face]], nodes.positions[node], nodes.normals[node]
         )

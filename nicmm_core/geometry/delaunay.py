@@ -39,7 +39,6 @@ def delaunay_faces(mesh: Mesh) -> IntArray:
             np.ascontiguousarray(mesh.vertices),
             faces,
             np.ascontiguousarray(opposite_sides(faces), np.int64),
-            np.arange(len(mesh.vertices)),
             float(np.cos(np.radians(angle))),
             TIE,
             checkpoint,

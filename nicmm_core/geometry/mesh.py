@@ -185,6 +185,17 @@ class Mesh:
         rows = [incidence.indices[slice(*bounds)] for bounds in zip(begin, end, strict=True)]
         return np.unique(np.concatenate(rows)).astype(np.int64)
 
+    def faces_near(self, vertices: IntArray) -> sparse.csr_array:
+        """Faces at vertices, (n, k), and the faces around these, as a CSR pattern of shape (n, F).
+
+        A row has the faces near all k vertices of this row.
+        """
+        n, k = vertices.shape
+        entries = (np.ones(n * k, dtype=np.int32), (np.arange(n).repeat(k), vertices.ravel()))
+        chosen = sparse.csr_array(entries, shape=(n, len(self.vertices)))
+        incidence = self.vertex_faces.astype(np.int32)  # sums of bytes might overflow to zero
+        return chosen @ incidence @ incidence.T @ incidence
+
     def faces_with(self, vertices: IntArray) -> IntArray:
         """Faces that have all of the given vertices, ascending."""
         around = self.faces_at(vertices[:1])

@@ -32,8 +32,8 @@ SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
 one pair of faces, so no two edges of the result have the same ends."""
 
-SUM_OF_COORDINATES = np.array([1.0, 0.7320508, 0.4142136])
-"""Weights of the coordinates in a sum that hardly any two positions have in common."""
+WEIGHTS_OF_COORDINATES = (1.0, 0.7320508, 0.4142136)
+"""Weights with which the sums of the coordinates of hardly any two positions are equal."""
 
 MOST_COMPARED = 32
 """Number of faces at an edge up to which all pairs of them are compared."""
@@ -113,8 +113,9 @@ def at_shared_positions(vertices: FloatArray, faces: IntArray) -> BoolArray:
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     used = np.flatnonzero(used)
-    # Numbers sort faster than rows. Equal positions have equal sums.
-    sums = vertices[used] @ SUM_OF_COORDINATES
+    # Numbers sort faster than rows. Equal positions have equal sums; those of a matrix product
+    # might be rounded otherwise in its last rows.
+    sums = sum(weight * vertices[used, axis] for axis, weight in enumerate(WEIGHTS_OF_COORDINATES))
     order = np.argsort(sums, kind="stable")
     same = sums[order[1:]] == sums[order[:-1]]
     alike = used[order[np.append(same, False) | np.append(False, same)]]

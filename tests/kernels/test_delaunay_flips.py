@@ -14,7 +14,6 @@ def flipped(vertices, faces, angle=30.0):
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(faces),
         opposite_sides(faces).astype(np.int64),
-        np.arange(len(vertices)),
         np.cos(np.radians(angle)),
         1e-9,
         lambda: None,
@@ -60,7 +59,7 @@ def test_the_plane_gets_the_triangulation_of_delaunay(seed):
     assert as_set(flipped(vertices, faces)) == as_set(expected)
 
 
-def test_squares_are_divided_at_the_vertex_of_least_rank():
+def test_squares_are_divided_at_the_vertex_of_least_index():
     vertices = np.array([[x, y, 0.0] for x in range(5) for y in range(5)])
     squares = np.array([[i, i + 5, i + 6, i + 1] for i in range(19) if i % 5 < 4])
     one = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]])

@@ -463,7 +463,6 @@ def arguments_flips(n=40):
         "vertices": BALL.vertices.copy(),
         "faces": BALL.faces[:n].copy(),
         "opposites": opposite_sides(BALL.faces[:n]),
-        "ranks": np.arange(len(BALL.vertices)),
         "flattest": 0.5,
         "tie": 0.01,
         "meanwhile": nothing,
