@@ -461,7 +461,7 @@ def test_iterations_are_few_from_afar_and_fewer_from_a_start():
     Without a start they also depend on the initial curve; that bound only detects regressions.
     """
     from_afar, dragged = [], []
-    for seed in range(6):
+    for seed in range(12):
         mesh = shapes.creature(seed, resolution=32, faces=1000)
         generator = np.random.default_rng(seed)
         for closed in (True, False):
