@@ -9,8 +9,8 @@ The stroke is smoothed by a spline, and control points are places on it:
    added, until it does not.
 3. The curve through these is designed without a start, as the caller will do. This ends as soon as
    a curve away from the stroke is fairer than the one along it. Control points are then added where
-   they differ. If that does not help, the first guess is tried instead, and then with further
-   points where lines between them turn much.
+   they differ. If that does not help, or the second step needs as many points as the first guess
+   has, the first guess is tried instead.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ from ..geometry.tolerances import COINCIDENT
 from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from ..path.spline_path import interpolating_spline
 from ..progress import checkpoint
-from ..relaxation.close_points import GREATEST_TURN, turns
 from ..repair.surface_normals import surface_normals
 
 SMOOTHING = 0.35
@@ -72,9 +71,9 @@ added. Where the distance is less, the curve often changes with them."""
 MOST_SAMPLES = 20_000
 """Greatest number of these samples on a line."""
 
-MOST_RELAXED, MOST_DESIGNED, MOST_CLOSE = 8, 6, 2
+MOST_RELAXED, MOST_DESIGNED = 8, 6
 """Greatest number of curves that are relaxed from the smoothed stroke in the second step, and that
-are designed without a start in each part of the third one; fewer in its last part."""
+are designed without a start in each part of the third one."""
 
 MOST_POINTS = 48
 """Greatest number of control points that are tried, unless the first guess has more than half of
@@ -184,16 +183,16 @@ def fitted_points(
     for places in _smoothed_lines(stroke, tolerance, closed):
         on_surface = nearest_points(mesh, places)[0]
         normals = surface_normals(mesh, on_surface.faces, on_surface.barycentric)
-        fit = _Fit(mesh, places, normals, samples, tolerance, closed, relax_along, design)
+        fit = _Fit(mesh, places, samples, tolerance, closed, relax_along, design)
         guess = _fewest_knots(places, normals, tolerance, closed)
         most = max(MOST_POINTS, 2 * len(guess))
         found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
-        if found is not None:
+        if found is not None and len(found) < len(guess):
             found = fit.refined(found, most, MOST_DESIGNED, along=False)
+        else:
+            found = None
         if found is None:
             found = fit.refined(guess, most, MOST_DESIGNED, along=False)
-        if found is None:
-            found = fit.refined(fit.close(guess), most, MOST_CLOSE, along=False)
         if found is not None:
             return fit.points(found)
     raise UnreachableError(
@@ -208,7 +207,6 @@ class _Fit:
 
     mesh: Mesh
     places: FloatArray
-    normals: FloatArray
     stroke: FloatArray
     tolerance: float
     closed: bool
@@ -255,24 +253,6 @@ class _Fit:
                 return None
             knots = finer
         return None
-
-    def close(self, knots: IntArray) -> IntArray:
-        """Knots, with others added beside those where lines between them turn much.
-
-        The course of the curve through them is then that of the stroke; see `close_points`.
-        """
-        m = len(self.places)
-        while True:
-            turning = turns(self.places[knots], self.normals[knots], self.closed) > GREATEST_TURN
-            before, after = np.roll(knots, 1), np.roll(knots, -1)
-            before[0] -= m
-            after[-1] += m
-            gaps = np.stack([[before, knots], [knots, after]], axis=1)[:, :, turning]
-            gaps = gaps.reshape(2, -1)
-            gaps = gaps[:, gaps[1] - gaps[0] >= 2 * APART]
-            if not gaps.size:
-                return knots
-            knots = np.union1d(knots, gaps.sum(axis=0) // 2 % m)
 
     def differs(self, curve: FloatArray) -> bool:
         """Whether a curve, (n, 3), is too far from the stroke somewhere."""
