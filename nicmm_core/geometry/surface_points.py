@@ -421,7 +421,11 @@ def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> 
     Returns
     -------
     (n, m) float array
-        Coordinates with respect to ``others``; zero at vertices that are not among the corners.
+        Coordinates with respect to ``others``; zero at vertices that are not among the corners,
+        and at repetitions of a vertex, as faces have whose vertices were joined.
     """
-    same = corners.T[:, None] == others.T
+    columns = others.T
+    same = corners.T[:, None] == columns
+    for apart in range(1, len(columns)):
+        same[:, apart:] &= columns[:-apart] != columns[apart:]
     return dot(barycentric.T[:, None], same).T

@@ -11,6 +11,7 @@ from nicmm_core.geometry.surface_points import (
     locate_control_points,
     locate_points,
     nearest_points,
+    weights_at,
 )
 from tests.core.checks import assert_valid_curve, joined, random_surface_points
 
@@ -217,3 +218,12 @@ def test_points_are_the_same_by_position_and_by_coordinates(body, size, away):
     np.testing.assert_array_equal(again.faces, points.faces)
     np.testing.assert_array_equal(again.barycentric, points.barycentric)
     assert (points.barycentric.sum(axis=1) == 1.0).all()
+
+
+def test_weights_with_respect_to_other_vertices_sum_to_one_where_these_repeat():
+    """As in a face of which two vertices were joined, which counts as one vertex there."""
+    corners = np.array([[4, 7, 9]] * 3)
+    weights = np.array([[0.25, 0.75, 0.0], [0.0, 1.0, 0.0], [0.5, 0.0, 0.5]])
+    others = np.array([[7, 4, 9], [7, 7, 4], [4, 9, 9]])
+    expected = [[0.75, 0.25, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0]]
+    np.testing.assert_array_equal(weights_at(corners, weights, others), expected)
