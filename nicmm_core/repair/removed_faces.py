@@ -77,9 +77,9 @@ class RemovedFaces:
                 here = self._in_face(here, int(np.append(after[point], back.faces)[-1]))
             parts += [into, here, out[::-1]]
             own += [False] * len(into) + [True] + [False] * len(out)
-        polyline, number = self._without_repeats(joined(parts), curve.closed)
-        number = number[own]
-        passed = number[curve.control_index[curve.control_index >= 0]]
+        passed = np.flatnonzero(own)[curve.control_index[curve.control_index >= 0]]
+        polyline, number = self._without_repeats(joined(parts), passed, curve.closed)
+        passed, number = number[passed], number[own]
         polyline, left = without_backtracking(self._mesh, polyline, passed, curve.closed)
         return with_points(self._mesh, curve, polyline, left[number])
 
@@ -204,14 +204,21 @@ class RemovedFaces:
         return (corners[:, :, None] == own[:, None]).any(axis=2).all(axis=1)
 
     def _without_repeats(
-        self, polyline: SurfacePoints, closed: bool
+        self, polyline: SurfacePoints, controls: IntArray, closed: bool
     ) -> tuple[SurfacePoints, IntArray]:
-        """Keep the last of consecutive points that are the same; also new indices of points."""
+        """Keep the last of consecutive points that are the same; also new indices of points.
+
+        A control point, given by its index, also stays before a point at a vertex that was joined
+        with its own.
+        """
         n = len(polyline)
         following = polyline[(np.arange(n) + 1) % n]
         own = self._faces[polyline.faces]
         there = weights_at(self._faces[following.faces], following.barycentric, own)
         same = self._hold(polyline.faces, following) & (there == polyline.barycentric).all(axis=1)
+        positions = polyline.positions(self._mesh)
+        onward = np.roll(positions, -1, axis=0)
+        same[controls] &= (positions[controls] == onward[controls]).all(axis=1)
         if not closed or same.all():
             same[-1] = False
         kept = np.flatnonzero(~same)
