@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from .environment import (
@@ -31,32 +32,58 @@ most of them Blender's module. The cause is not known.
 
 
 def run_checks(quick: bool, pytest_arguments: Sequence[str]) -> int:
-    """Lint, format, types and tests; returns 0 if all of them pass."""
+    """Lint, format, types and tests; returns 0 if all of them pass.
+
+    Types are checked while the tests run, since processes of the tests sometimes wait for others.
+    """
     extension = DIST / "checked" / manifest()["id"]  # in the zip's layout, its imports are valid
     shutil.rmtree(extension, ignore_errors=True)
     stage(extension)
     typed = ("mypy", "--config-file", ROOT / "pyproject.toml", "--cache-dir", ROOT / ".mypy_cache")
-    checks: tuple[tuple[str, Path, Sequence[str | Path]], ...] = (
-        ("ruff check", ROOT, ("ruff", "check")),
-        ("ruff format", ROOT, ("ruff", "format", "--check")),
-        ("mypy", ROOT, ("mypy",)),
-        ("mypy of the extension", extension, (*typed, "__init__.py", "nicmm_blender")),
-        *((name, ROOT, command) for name, command in _pytest_commands(quick, pytest_arguments)),
-    )
+    of_types: dict[str, tuple[Path, Sequence[str | Path]]] = {
+        "mypy": (ROOT, ("mypy",)),
+        "mypy of the extension": (extension, (*typed, "__init__.py", "nicmm_blender")),
+    }
+    others = {
+        "ruff check": ("ruff", "check"),
+        "ruff format": ("ruff", "format", "--check"),
+        **dict(_pytest_commands(quick, pytest_arguments)),
+    }
     failed = []
-    for name, folder, command in checks:
-        say(name)
-        if not _passes(command, folder):
-            failed.append(name)
+    with ThreadPoolExecutor(1) as meanwhile:
+        begun = {name: meanwhile.submit(_said, *check) for name, check in of_types.items()}
+        for name, command in others.items():
+            say(name)
+            if not _passes(command):
+                failed.append(name)
+        for name, check in begun.items():
+            say(name)
+            code, output = check.result()
+            print(output, end="", flush=True)
+            if code:
+                failed.append(name)
     if failed:
         say(f"Failed: {', '.join(failed)}")
     return 1 if failed else 0
 
 
-def _passes(command: Sequence[str | Path], folder: Path) -> bool:
+def _said(folder: Path, command: Sequence[str | Path]) -> tuple[int, str]:
+    """Run a check in a folder; its exit status and its output."""
+    done = subprocess.run(
+        [VENV_PYTHON, "-m", *command],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        check=False,
+    )
+    return done.returncode, done.stdout
+
+
+def _passes(command: Sequence[str | Path]) -> bool:
     """Run a check; where a test process has crashed, its stack then stands at the end."""
     with tempfile.TemporaryFile() as errors:
-        passed = run([VENV_PYTHON, "-m", *command], ONE_THREAD, folder, errors) == 0
+        passed = run([VENV_PYTHON, "-m", *command], ONE_THREAD, errors=errors) == 0
         errors.seek(0)
         for line in errors.read().decode("utf-8", "replace").splitlines():
             if not line.startswith("Extension modules:"):
