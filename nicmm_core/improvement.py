@@ -135,7 +135,7 @@ def relaxation_config(request: Request) -> RelaxationConfig:
     return RelaxationConfig() if request.alignment is None else GUIDED
 
 
-@dataclass(frozen=True)
+@dataclass
 class Rival:
     """A curve through the same control points, which a design may or may not equal in the end.
 
@@ -144,10 +144,13 @@ class Rival:
     curve : DiscreteCurve
     differs_from : callable
         Whether another curve, given by its points, (n, 3), counts as another one.
+    is_beaten : bool
+        Whether a fairer curve has ended the design.
     """
 
     curve: DiscreteCurve
     differs_from: Callable[[FloatArray], bool]
+    is_beaten: bool = False
 
 
 class RivalBeatenError(Exception):
@@ -206,6 +209,7 @@ class Improvement:
         (theirs,), best = self._energies_of([self.rival.curve]), self.best
         is_beaten = self.energies[best] < theirs
         if is_beaten and self.rival.differs_from(self.relaxed[best].curve.points):
+            self.rival.is_beaten = True
             raise RivalBeatenError
 
     def improve(self, courses: Iterator[InitialCurve], start_kind: StartKind) -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import progress, shapes
+from nicmm_core import progress, shapes, start_search
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points
 from tests.core.checks import random_surface_points
@@ -47,6 +47,27 @@ def test_a_noisy_curve_is_fitted_by_few_points(request, name, closed, seed):
     assert 2 + closed <= len(fitted) <= SAMPLES // 20
     found = nicmm.design_curve(mesh, fitted, closed=closed).curves[0]
     assert farthest(found, stroke) <= 2.0 * noise * 1.001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_curve_through_the_points_has_been_designed_already(body, monkeypatch, closed):
+    """It is the curve that another Designer finds."""
+    designer = nicmm.Designer(body)
+    curve = designer.design(random_surface_points(body, 4, 0), closed=closed).curves[0]
+    tolerance = 0.02 * body.diagonal
+    points = designer.fit_stroke(stroke_of(curve, 0.5 * tolerance), tolerance, closed)
+    own = nicmm.design_curve(body, points, closed=closed)
+    searched = []
+    monkeypatch.setattr(
+        start_search.StartSearch, "first", lambda *given: searched.append(given) or own
+    )
+    found = designer.design(points, closed=closed)
+    np.testing.assert_array_equal(found.curves[0].points, own.curves[0].points)
+    assert not searched
+    with pytest.raises(TypeError):  # another request is designed
+        designer.design(points, closed=closed, smoothness=0.5)
+    assert searched
 
 
 @pytest.mark.slow
