@@ -1,5 +1,7 @@
 """Curves from strokes and along features, in the installed extension."""
 
+from importlib import import_module
+
 import bpy
 import numpy as np
 import pytest
@@ -46,6 +48,31 @@ def test_a_stroke_becomes_a_curve_with_few_points(extension, ball, closed):
     assert curve is not ball and curve.data.splines[0].use_cyclic_u == closed
     assert scenes.distances_to(stroke, scenes.points(curve)).max() < 0.08
     assert 3 <= len(control_points(extension, curve)) <= 20
+
+
+@pytest.mark.slow
+def test_the_curve_of_a_stroke_is_not_designed_twice(extension, ball, monkeypatch):
+    """The fit has designed it already."""
+    designer = import_module(f"{extension.name}.nicmm_core.surface_designer").SurfaceDesigner
+    requests, design = [], designer.design
+
+    def spy(self, request, *given):
+        requests.append(request)
+        return design(self, request, *given)
+
+    monkeypatch.setattr(designer, "design", spy)
+    fit, fitted = extension.core.Designer.fit_stroke, []
+
+    def fit_and_count(self, *given, **named):
+        points = fit(self, *given, **named)
+        fitted.append(len(requests))
+        return points
+
+    monkeypatch.setattr(extension.core.Designer, "fit_stroke", fit_and_count)
+    angles = np.linspace(0.0, 3.0, 100)
+    stroke = on_ball(angles, 0.3 * np.sin(2.0 * angles))
+    assert bpy.ops.nicmm.stroke_curve(points=as_points(stroke), tolerance=0.06) == {"FINISHED"}
+    assert fitted == [len(requests)]
 
 
 @pytest.mark.slow
