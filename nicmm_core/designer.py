@@ -430,9 +430,14 @@ class Designer:
                     )
             with subrange(1.0 - left, 1.0 - 0.5 * left):
                 found = self._designed(request, time.perf_counter(), rival=rival)
-            checkpoint()  # a cancelled design may have an unfinished curve
+                checkpoint()  # a cancelled design may have an unfinished curve
+                ended_early = rival is not None and rival.is_beaten
+                if ended_early and not differs(found.curves[0].points):
+                    # It differed only before it was relaxed on the given faces.
+                    found, ended_early = self._designed(request, time.perf_counter()), False
+                    checkpoint()
             left *= 0.5
-            if rival is None or not rival.is_beaten:
+            if not ended_early:
                 self._answer = _Answer(request, found)  # the caller will ask for it next
             return only_curve(found, "design")
 
