@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import progress, shapes, start_search
+from nicmm_core import improvement, progress, shapes, start_search
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.surface_points import nearest_points
 from tests.core.checks import random_surface_points
@@ -68,6 +68,24 @@ def test_the_curve_through_the_points_has_been_designed_already(body, monkeypatc
     with pytest.raises(TypeError):  # another request is designed
         designer.design(points, closed=closed, smoothness=0.5)
     assert searched
+
+
+@pytest.mark.slow
+def test_the_curve_of_the_caller_counts_even_if_each_design_ends_early(monkeypatch):
+    """As where a curve differs from the stroke only before it is relaxed on the given faces."""
+    body = shapes.creature(5, faces=200, subdivisions=1)
+    curve = nicmm.design_curve(body, random_surface_points(body, 4, 5), order="shortest").curves[0]
+    tolerance = 0.02 * body.diagonal
+    stroke = stroke_of(curve, 0.5 * tolerance, 5)
+
+    def beaten(self):
+        if self.rival is not None:
+            self.rival.is_beaten = True
+            raise improvement.RivalBeatenError
+
+    monkeypatch.setattr(improvement.Improvement, "_check_rival", beaten)
+    fitted = nicmm.fit_stroke(body, stroke, tolerance, closed=True)
+    assert farthest(nicmm.design_curve(body, fitted).curves[0], stroke) <= tolerance * 1.001
 
 
 @pytest.mark.slow
