@@ -99,8 +99,8 @@ class _Free:
 
 
 @dataclass(frozen=True)
-class _Answer:
-    """The design of the last request that the fit of a stroke has made."""
+class _Kept:
+    """A request and its design, kept for a caller who asks for the same."""
 
     request: Request
     design: Design
@@ -123,7 +123,7 @@ class Designer:
         self._free: _Free | None = None  # of the last request with obstacles
         self._off_curves: SurfaceOffCurves | None = None  # of the last one with curves to avoid
         self._reflected: ReflectedVertices | None = None  # of the last one with maps and a mirror
-        self._answer: _Answer | None = None
+        self._kept: _Kept | None = None  # the last design of a fit
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
 
@@ -220,9 +220,9 @@ class Designer:
         Faces that cleaning removes may be so wide, compared with the rest, that no curve leads
         across them; a manifold that is cleaned less has them.
         """
-        last, anew = self._answer, start is None and max_iterations is None and rival is None
-        if anew and last is not None and same_request(request, last.request):
-            return replace(last.design, seconds=time.perf_counter() - started)
+        kept, anew = self._kept, start is None and max_iterations is None and rival is None
+        if anew and kept is not None and same_request(request, kept.request):
+            return replace(kept.design, seconds=time.perf_counter() - started)
         failure: NotOnOriginalError | None = None
         for manifold, there in self._manifolds(request):
             if isinstance(start, Design) and _answers(start, manifold, there):
@@ -438,7 +438,7 @@ class Designer:
                     checkpoint()
             left *= 0.5
             if not ended_early:
-                self._answer = _Answer(request, found)  # the caller will ask for it next
+                self._kept = _Kept(request, found)
             return only_curve(found, "design")
 
         return fitted_points(self.mesh, stroke, tolerance, closed, relax_along, design)

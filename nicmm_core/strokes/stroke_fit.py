@@ -186,11 +186,10 @@ def fitted_points(
         fit = _Fit(mesh, places, samples, tolerance, closed, relax_along, design)
         guess = _fewest_knots(places, normals, tolerance, closed)
         most = max(MOST_POINTS, 2 * len(guess))
-        found = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
-        if found is not None and len(found) < len(guess):
-            found = fit.refined(found, most, MOST_DESIGNED, along=False)
-        else:
-            found = None
+        few = fit.refined(_some_of(guess, closed), most, MOST_RELAXED, along=True)
+        found = None
+        if few is not None and len(few) < len(guess):
+            found = fit.refined(few, most, MOST_DESIGNED, along=False)
         if found is None:
             found = fit.refined(guess, most, MOST_DESIGNED, along=False)
         if found is not None:

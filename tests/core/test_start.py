@@ -456,12 +456,12 @@ class TestRefusals:
 
 @pytest.mark.slow
 def test_iterations_are_few_from_afar_and_fewer_from_a_start():
-    """The counts, over random points on generated creatures, include every attempt.
+    """The counts are medians over random points on generated creatures and include every attempt.
 
     Without a start they also depend on the initial curve; that bound only detects regressions.
     """
     from_afar, dragged = [], []
-    for seed in range(6):
+    for seed in range(12):
         mesh = shapes.creature(seed, resolution=32, faces=1000)
         generator = np.random.default_rng(seed)
         for closed in (True, False):
@@ -475,7 +475,7 @@ def test_iterations_are_few_from_afar_and_fewer_from_a_start():
                 assert_valid_design(mesh, design, closed=closed)
                 dragged.append(design.iterations)
     assert np.median(from_afar) <= 10
-    assert np.mean(dragged) <= 4.5
+    assert np.median(dragged) <= 3
 
 
 class TestPaintedBesideACurve:
