@@ -5,12 +5,12 @@
 
 #include <string.h>
 
-enum { ROWS = 4, WIDTH = 16, DEPTH = 256 };
+enum { SINGLE_ROWS = 4, DOUBLE_ROWS = 2, WIDTH = 16, DEPTH = 256 };
 
 /* The product (n, m) of (n, k) and (k, m), in blocks of ROWS rows and WIDTH columns, which stay in
    registers while up to DEPTH terms are added. A panel holds these columns of the second matrix,
    with zeros beyond its last one. */
-#define DEFINE_PRODUCT(NAME, REAL, TARGET)                                                         \
+#define DEFINE_PRODUCT(NAME, REAL, ROWS, TARGET)                                                   \
     TARGET static void NAME(int64_t n, int64_t k, int64_t m, const REAL *first,                    \
                             const REAL *second, REAL *product)                                     \
     {                                                                                              \
@@ -44,8 +44,8 @@ enum { ROWS = 4, WIDTH = 16, DEPTH = 256 };
 #if defined(__x86_64__)
 #include <cpuid.h>
 
-DEFINE_PRODUCT(wide_single, float, __attribute__((target("avx2"))))
-DEFINE_PRODUCT(wide_double, double, __attribute__((target("avx2"))))
+DEFINE_PRODUCT(wide_single, float, SINGLE_ROWS, __attribute__((target("avx2"))))
+DEFINE_PRODUCT(wide_double, double, DOUBLE_ROWS, __attribute__((target("avx2"))))
 
 /* Whether the processor has vectors of 256 bits, and the system saves their registers. */
 EXPORTED int has_wide_vectors(void)
@@ -66,8 +66,8 @@ EXPORTED int has_wide_vectors(void)
 }
 #endif
 
-DEFINE_PRODUCT(narrow_single, float, )
-DEFINE_PRODUCT(narrow_double, double, )
+DEFINE_PRODUCT(narrow_single, float, SINGLE_ROWS, )
+DEFINE_PRODUCT(narrow_double, double, DOUBLE_ROWS, )
 
 EXPORTED int single_product(int64_t n, int64_t k, int64_t m, const float *first,
                             const float *second, int64_t wide, float *product)
